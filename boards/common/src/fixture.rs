@@ -5,7 +5,9 @@ use core::convert::Infallible;
 use motion_kernel::hal::{
     BoardOutputs, DriveEnable, Encoder, Inputs, MachineInputs, OutputState, Outputs, VelocityChannel,
 };
+use motion_kernel::link::{Identity, PROTOCOL};
 use motion_kernel::live::Leads;
+use motion_kernel::program::FORMAT;
 use motion_kernel::units::{Counts, DacCode, Position};
 
 use crate::parameters::BoardParameters;
@@ -32,6 +34,20 @@ pub(crate) type Machine<'a> = crate::machine::Machine<'a, f32, AXES>;
 
 pub(crate) fn machine() -> Machine<'static> {
     Machine::new(PROGRAM, &BOARD).expect("suits")
+}
+
+/// Of a board on the link, with room for so many items.
+pub(crate) fn identity(items: usize) -> Identity {
+    Identity {
+        protocol: PROTOCOL,
+        format: FORMAT.into(),
+        axes: AXES as u16,
+        is_fixed_point: false,
+        tick_s: TICK_S,
+        items: items as u16,
+        outputs: BOARD.outputs,
+        machine: machine().program.machine_checksum(),
+    }
 }
 
 /// Where the stringer ends, as `motion compile` prints it.

@@ -106,7 +106,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
     }
 
     /// One poll: takes what `next_byte` has, obeys the operator, plans, which may take several ticks. `next_byte` is that of
-    /// [`Streamed::poll`].
+    /// [`Streamed::plan`].
     pub fn poll<const ROWS: usize, const AFTER: usize>(
         &mut self,
         next_byte: &mut dyn FnMut() -> Option<u8>,
@@ -115,7 +115,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
         self.poll_unless(&|| false, next_byte, control);
     }
 
-    /// [`Self::poll`] with a hold on the board; see [`Streamed::poll_unless`].
+    /// [`Self::poll`] with a hold on the board; see [`Streamed::plan`].
     pub fn poll_unless<const ROWS: usize, const AFTER: usize>(
         &mut self,
         is_hold_asked: &dyn Fn() -> bool,
@@ -326,32 +326,22 @@ fn machine_state(is_off: bool, live: State, tick: ExecState) -> MachineState {
 mod tests {
     use motion_kernel::fault::FaultKind;
     use motion_kernel::flight::FlightRecorder;
-    use motion_kernel::hal::{BoardOutputs, Spindle};
+    use motion_kernel::hal::Spindle;
     use motion_kernel::kernel::Kernel;
-    use motion_kernel::link::{Event, FRAME_MAX, HostLink, Identity, Mode, PROTOCOL};
+    use motion_kernel::link::{Event, FRAME_MAX, HostLink, Mode};
     use motion_kernel::program::Item;
     use motion_kernel::queue::LiveStreams;
     use motion_kernel::units::{Counts, Position};
     use rtic_core::Exclusive;
 
     use super::*;
-    use crate::fixture::{AXES, BOARD, IdealDrives, TICK_S, end, machine};
+    use crate::fixture::{AXES, BOARD, IdealDrives, TICK_S, end, identity, machine};
     use crate::runs::to_start;
 
     type Host = HostLink<AXES, 64, 8192>;
     type State = MachineState;
 
     const ITEMS: usize = 8;
-    const IDENTITY: Identity = Identity {
-        protocol: PROTOCOL,
-        format: 5,
-        axes: AXES as u16,
-        is_fixed_point: false,
-        tick_s: TICK_S,
-        items: ITEMS as u16,
-        outputs: BoardOutputs::FixedSpeed,
-        machine: 0,
-    };
 
     /// A program from `from` on: a straight way to the stringer's start, and the stringer.
     fn stringer(from: [Position; AXES]) -> Vec<Option<Item<AXES>>> {
@@ -409,7 +399,7 @@ mod tests {
         let (feeder, intake) = streams.split(header.rules, header.start);
         let kernel = Kernel::new(&machine.axes, header.start, [Counts(0); AXES]);
         let mut control = Control::new(kernel, intake, &mut flight);
-        let link = BoardLink::new(3, IDENTITY);
+        let link = BoardLink::new(3, identity(ITEMS));
         let mut linked = Linked::<f32, AXES, ITEMS, 64, 0>::new(&BOARD, link, feeder, header.pulse);
         let mut drives = IdealDrives::new();
         let mut operator = Operator {
@@ -450,7 +440,7 @@ mod tests {
                     *status = Some(told);
                 }
                 Event::Ready { .. } => *is_ready = true,
-                Event::Welcome(identity) => assert_eq!(identity, IDENTITY),
+                Event::Welcome(found) => assert_eq!(found, identity(ITEMS)),
                 other => panic!("{other:?}"),
             });
         }

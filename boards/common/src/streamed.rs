@@ -62,34 +62,9 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         Self { link: RefCell::new(link), feeder, control, obeyed: Controls::NONE }
     }
 
-    /// One poll of the background: takes what `next_byte` has, obeys the operator, plans. `next_byte` is asked between the
-    /// steps of a plan, too: a hold ends the plan, and items that come meanwhile are dropped and come again. So whoever gives
-    /// it may count there that the background is alive.
-    ///
-    /// What the operator asks of the rest of the board, whatever became of the motion. An item that can't be executed is an
-    /// error of this and every later call, and motion ends at rest.
-    pub fn poll(
-        &mut self,
-        next_byte: &mut dyn FnMut() -> Option<u8>,
-    ) -> (Requests, Result<(), SupplyError<Infallible>>) {
-        self.poll_unless(&|| false, next_byte)
-    }
-
-    /// [`Self::poll`], in which motion is held wherever `is_hold_asked` says so, which a hold on the board does: a button. It
-    /// is asked between the steps of a plan, too, and needs no filter, as what bounces holds again. Only the operator's next
-    /// resume over the link goes on, and not while it still says so.
-    pub fn poll_unless(
-        &mut self,
-        is_hold_asked: &dyn Fn() -> bool,
-        next_byte: &mut dyn FnMut() -> Option<u8>,
-    ) -> (Requests, Result<(), SupplyError<Infallible>>) {
-        let requests = self.receive(next_byte);
-        (requests, self.plan(is_hold_asked, next_byte))
-    }
-
-    /// The first part of a poll: takes what `next_byte` has, and obeys the operator. Parameters that came wait for who puts
-    /// them away before the second part.
-    pub(crate) fn receive(&mut self, next_byte: &mut dyn FnMut() -> Option<u8>) -> Requests {
+    /// The first part of a poll of the background: takes what `next_byte` has, and obeys the operator; what he asks of the rest
+    /// of the board. Parameters that came wait for who puts them away before the second part.
+    pub fn receive(&mut self, next_byte: &mut dyn FnMut() -> Option<u8>) -> Requests {
         let Self { link, control, obeyed, .. } = self;
         let mut bytes = core::iter::from_fn(next_byte);
         let link = link.get_mut();
@@ -105,8 +80,16 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         }
     }
 
-    /// The second part: plans.
-    pub(crate) fn plan(
+    /// The second part: plans. `next_byte` is asked between the steps of a plan, too: a hold ends the plan, and items that come
+    /// meanwhile are dropped and come again. So whoever gives it may count there that the background is alive.
+    ///
+    /// Motion is held wherever `is_hold_asked` says so, which a hold on the board does: a button. It is asked between the steps
+    /// of a plan, too, and needs no filter, as what bounces holds again. Only the operator's next resume over the link goes on,
+    /// and not while it still says so.
+    ///
+    /// # Errors
+    /// An item can't be executed: of this and every later call. Motion ends at rest.
+    pub fn plan(
         &mut self,
         is_hold_asked: &dyn Fn() -> bool,
         next_byte: &mut dyn FnMut() -> Option<u8>,
@@ -222,30 +205,19 @@ fn set<R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>(
 #[cfg(test)]
 mod tests {
     use motion_kernel::exec::{ExecState, Executor};
-    use motion_kernel::hal::BoardOutputs;
-    use motion_kernel::link::{Event, FRAME_MAX, HostLink, Identity, PROTOCOL, State as MachineState};
+    use motion_kernel::link::{Event, FRAME_MAX, HostLink, State as MachineState};
     use motion_kernel::program::Item;
     use motion_kernel::queue::LiveStreams;
     use motion_kernel::straight::Straight;
 
     use super::*;
-    use crate::fixture::{AXES, TICK_S, end, machine};
+    use crate::fixture::{AXES, end, identity, machine};
 
     const ITEMS: usize = 8;
     /// Few, so that a board has far less than the program.
     const PIECES: usize = 20;
     /// How often the stringer is driven: many more items than there is room for.
     const ROUNDS: usize = 5;
-    const IDENTITY: Identity = Identity {
-        protocol: PROTOCOL,
-        format: 5,
-        axes: AXES as u16,
-        is_fixed_point: false,
-        tick_s: TICK_S,
-        items: ITEMS as u16,
-        outputs: BoardOutputs::None,
-        machine: 0,
-    };
 
     /// Knuth's generator of full period; its upper bits.
     struct Random(u64);
@@ -294,7 +266,7 @@ mod tests {
         let mut host = HostLink::<AXES, 64, 8192>::new(1);
         let mut streams = LiveStreams::<f32, AXES, PIECES, 16>::new();
         let (feeder, mut intake) = streams.split(header.rules, header.start);
-        let link = BoardLink::new(9, IDENTITY);
+        let link = BoardLink::new(9, identity(ITEMS));
         let mut board =
             Streamed::<f32, AXES, ITEMS, 64>::new(link, feeder, header.pulse, header.tick_s, Leads::NONE);
         let mut executor = Executor::<f32, AXES>::new(header.start);
@@ -327,8 +299,8 @@ mod tests {
             let mut frame = out[..length].to_vec();
             harms(&mut frame);
             of_host.extend(frame);
-            let (asked, polled) = board.poll(&mut || of_host.pop_front());
-            polled.expect("executable");
+            let asked = board.receive(&mut || of_host.pop_front());
+            board.plan(&|| false, &mut || of_host.pop_front()).expect("executable");
             requests.push(asked);
             let executed = executor.tick(&mut intake).expect("no fault");
             state = executed.state;

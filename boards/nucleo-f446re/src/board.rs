@@ -15,7 +15,6 @@ use stm32f4xx_hal::pac::rcc::csr;
 use stm32f4xx_hal::pac::{self, SPI2};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config;
-use stm32f4xx_hal::serial::SerialExt;
 use stm32f4xx_hal::spi::{Spi, SpiExt};
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
@@ -161,16 +160,11 @@ impl Board {
         // Pulled up: without ST-LINK's power nobody drives the line.
         let receive: PA3<Alternate<7>> = gpioa.pa3.into_alternate().internal_resistor(Pull::Up);
         #[cfg(not(feature = "link"))]
-        let line = {
-            use nucleo_f446re::design_parameters::CONSOLE_BAUD;
-            match device.USART2.rx(receive, CONSOLE_BAUD.bps(), &mut rcc) {
-                Ok(console) => console,
-                Err(_) => defmt::panic!("console: {=u32} baud can't be had", CONSOLE_BAUD),
-            }
-        };
+        let line = crate::console_port::open(device.USART2, receive, &mut rcc);
         #[cfg(feature = "link")]
         let line = {
             use nucleo_f446re::design_parameters::{LINK_BAUD, LINK_DIVIDER};
+            use stm32f4xx_hal::serial::SerialExt;
             use stm32f4xx_hal::serial::config::{Config, DmaConfig};
             let config = Config::default().baudrate(LINK_BAUD.bps()).dma(DmaConfig::TxRx);
             let serial = match device.USART2.serial((gpioa.pa2, receive), config, &mut rcc) {

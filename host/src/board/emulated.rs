@@ -107,14 +107,6 @@ impl Emulated {
         Ok(Self { child, _record: file })
     }
 
-    /// Waits for its end: the image says why before.
-    ///
-    /// # Errors
-    /// It can't be waited for.
-    pub fn wait(&mut self) -> io::Result<std::process::ExitStatus> {
-        self.child.wait()
-    }
-
     /// Whether it has ended.
     ///
     /// # Errors

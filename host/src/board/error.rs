@@ -3,7 +3,7 @@
 use std::io;
 
 use motion_kernel::hal::BoardOutputs;
-use motion_kernel::link::{PushError, WriteError};
+use motion_kernel::link::{Identity, PROTOCOL, PushError, WriteError};
 use motion_kernel::program::ProgramError;
 use thiserror::Error;
 
@@ -139,6 +139,21 @@ pub enum BoardError {
 }
 
 impl BoardError {
+    /// Whether a board has this protocol and `axes` axes, which the link needs before anything else.
+    ///
+    /// # Errors
+    /// In what it differs.
+    pub fn unless_linked(identity: &Identity, axes: usize) -> Result<(), Self> {
+        let (what, found, expected) = if identity.protocol != PROTOCOL {
+            (Agreement::Protocol, identity.protocol.to_string(), PROTOCOL.to_string())
+        } else if usize::from(identity.axes) != axes {
+            (Agreement::Axes, identity.axes.to_string(), axes.to_string())
+        } else {
+            return Ok(());
+        };
+        Err(Self::Disagrees { what, found, expected })
+    }
+
     /// Whether the user's input is wrong, and not what the board or the wire did.
     #[must_use]
     pub fn is_input(&self) -> bool {

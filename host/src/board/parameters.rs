@@ -3,12 +3,13 @@
 use std::time::{Duration, Instant};
 
 use motion_kernel::axis::Guards;
-use motion_kernel::link::{Event, Identity, PROTOCOL, State};
+use motion_kernel::link::{Event, Identity, State};
 use motion_kernel::program::{Header, ProgramError, Reader};
 use serde_json::Value;
 
 use super::connection::{Connection, Heard};
-use super::error::{Agreement, BoardError};
+use super::error::BoardError;
+use super::job;
 
 /// The longest time for an answer, and for a board that starts anew.
 const ANSWER: Duration = Duration::from_secs(20);
@@ -93,11 +94,7 @@ pub fn read<const M: usize>(connection: &mut Connection<M>) -> Result<Vec<u8>, B
     let mut record = Vec::new();
     connection.read_parameters(0);
     until(connection, |event, connection| {
-        let (offset, length, piece) = match event {
-            Event::Parameters { offset, length, piece } => (offset, length, piece),
-            Event::Refused(identity) => return Err(disagrees(&identity, M)),
-            _ => return Ok(None),
-        };
+        let Event::Parameters { offset, length, piece } = event else { return Ok(None) };
         if offset as usize == record.len() {
             record.extend_from_slice(piece.bytes());
         }
@@ -114,7 +111,7 @@ pub fn read<const M: usize>(connection: &mut Connection<M>) -> Result<Vec<u8>, B
 /// # Errors
 /// The board refuses them, is lost, or does not answer.
 pub fn write<const M: usize>(connection: &mut Connection<M>, record: &[u8]) -> Result<Identity, BoardError> {
-    let machine = record.last_chunk().map_or(0, |sum| u32::from_le_bytes(*sum));
+    let machine = job::checksum(record);
     connection.write_parameters(record, 0);
     until(connection, |event, connection| match event {
         Event::Written { error: Some(error), .. } => Err(BoardError::Parameters(error)),
@@ -126,23 +123,12 @@ pub fn write<const M: usize>(connection: &mut Connection<M>, record: &[u8]) -> R
             connection.write_parameters(record, bytes);
             Ok(None)
         }
-        Event::Refused(identity) => Err(disagrees(&identity, M)),
         Event::Restarted { .. } => {
             connection.accept();
             Ok(connection.identity().copied().filter(|identity| identity.machine == machine))
         }
         _ => Ok(None),
     })
-}
-
-/// In what a board that is refused differs.
-fn disagrees(identity: &Identity, axes: usize) -> BoardError {
-    let (what, found, expected) = if identity.protocol == PROTOCOL {
-        (Agreement::Axes, identity.axes.to_string(), axes.to_string())
-    } else {
-        (Agreement::Protocol, identity.protocol.to_string(), PROTOCOL.to_string())
-    };
-    BoardError::Disagrees { what, found, expected }
 }
 
 /// Has the drives switched off, and waits for that.
@@ -152,7 +138,6 @@ fn disagrees(identity: &Identity, axes: usize) -> BoardError {
 pub fn disable<const M: usize>(connection: &mut Connection<M>) -> Result<(), BoardError> {
     let mut is_told = false;
     until(connection, |event, connection| match event {
-        Event::Refused(identity) => Err(disagrees(&identity, M)),
         Event::Status(_) if !is_told => {
             is_told = connection.command(|link| link.enable(false));
             Ok(None)
@@ -174,6 +159,9 @@ fn until<const M: usize, T>(
         connection.step(Duration::from_millis(10), &mut |one| heard.push(one));
         for one in heard {
             match one {
+                Heard::Board(Event::Refused(identity)) => {
+                    BoardError::unless_linked(&identity, M)?;
+                }
                 Heard::Board(event) => {
                     if !matches!(event, Event::Status(_) | Event::Written { .. }) {
                         since = Instant::now();

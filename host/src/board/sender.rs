@@ -198,17 +198,17 @@ impl<'a, const M: usize> Sender<'a, M> {
             // A command may have got lost, and comes again.
             return Ok(self.step);
         };
-        if let Some(fault) = status.fault
-            && !matches!(self.step, Step::Greets | Step::Clears)
-        {
+        let may_be_faulted = match self.step {
+            Step::Greets => true,
+            Step::Clears => self.since.elapsed() <= ENABLE,
+            _ => false,
+        };
+        if let Some(fault) = status.fault.filter(|_| !may_be_faulted) {
             return Err(self.fault(fault));
         }
         match self.step {
             Step::Greets => self.greeted(&status, next, connection)?,
             Step::Clears if status.fault.is_none() => self.enable(connection),
-            Step::Clears if self.since.elapsed() > ENABLE => {
-                return Err(status.fault.map_or(BoardError::Off, |fault| self.fault(fault)));
-            }
             Step::Enables if status.state != State::Off => self.approach(&status, connection)?,
             Step::Enables if self.since.elapsed() > ENABLE => {
                 return Err(BoardError::StaysOff { is_ready: status.is_ready });

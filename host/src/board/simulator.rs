@@ -207,7 +207,7 @@ fn run_once<const N: usize>(
         tick_s: header.tick_s,
         items: ITEMS as u16,
         outputs: board.outputs,
-        machine: record.last_chunk().map_or(0, |sum| u32::from_le_bytes(*sum)),
+        machine: machine.program.machine_checksum(),
     };
     let mut flight = Box::new(FlightRecorder::<Number, N, ROWS, AFTER>::new());
     let mut streams = Box::new(LiveStreams::<Number, N, PIECES, SEGMENTS>::new());

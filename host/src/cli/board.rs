@@ -12,7 +12,7 @@ use super::error::{CliError, Outcome};
 use super::input;
 use super::port::number;
 use crate::board::emulated::{Core, Emulated, EmulatedError};
-use crate::board::{BoardError, job, simulator};
+use crate::board::{job, simulator};
 use crate::files::interrupt;
 use crate::machine::{Machine, on_machine};
 
@@ -58,10 +58,7 @@ fn core(text: &str) -> Result<Core, String> {
 /// The machine file or the address is refused.
 pub fn run(arguments: &BoardArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let machine = input::any_machine(arguments.machine.as_ref())?;
-    let refused = |error: io::Error| CliError::Board {
-        port: format!("--listen {}", arguments.listen),
-        source: BoardError::Wire(error),
-    };
+    let refused = |source: io::Error| CliError::Listen { address: arguments.listen.clone(), source };
     let listener = TcpListener::bind(&arguments.listen).map_err(refused)?;
     let address = listener.local_addr().map_err(refused)?;
     if let Some(core) = arguments.emulated {

@@ -190,6 +190,14 @@ pub enum CliError {
         /// Why.
         source: BoardError,
     },
+    /// A board can't take connections there.
+    #[error("--listen {address}: found {source}, expected an address of this computer that is free")]
+    Listen {
+        /// The address, as the user gave it.
+        address: String,
+        /// The system's reason.
+        source: io::Error,
+    },
     /// There is no emulated board.
     #[error(transparent)]
     Emulated(#[from] EmulatedError),

@@ -4,14 +4,13 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use motion_kernel::link::{Identity, PROTOCOL};
+use motion_kernel::link::Identity;
 use serde_json::Value;
 
 use super::error::{CliError, Outcome};
 use super::outputs::Written;
 use super::port::PortArguments;
 use super::{input, send, write_json};
-use crate::board::error::Agreement;
 use crate::board::job;
 use crate::board::parameters::{Difference, Figures, disable, read, write};
 use crate::board::{BoardError, Connection, Port};
@@ -133,27 +132,22 @@ pub(super) fn identity(port: &PortArguments) -> Result<Identity, CliError> {
     let mut connection = port.open::<1>()?;
     send::greet(&mut connection).map_err(|error| port.refused(error))?;
     match connection.identity() {
-        Some(identity) if identity.protocol != PROTOCOL => {
-            let what = Agreement::Protocol;
-            let (found, expected) = (identity.protocol.to_string(), PROTOCOL.to_string());
-            Err(port.refused(BoardError::Disagrees { what, found, expected }))
+        Some(identity) if (1..=9).contains(&identity.axes) => {
+            let linked = BoardError::unless_linked(identity, identity.axes.into());
+            linked.map(|()| *identity).map_err(|error| port.refused(error))
         }
-        Some(identity) if (1..=9).contains(&identity.axes) => Ok(*identity),
         _ => Err(port.refused(BoardError::Silent)),
     }
 }
 
 fn connected<const M: usize>(port: &PortArguments) -> Result<Connection<M>, CliError> {
     let mut connection = port.open::<M>()?;
-    send::greet(&mut connection).map_err(|error| port.refused(error))?;
-    match connection.identity() {
-        Some(identity) if usize::from(identity.axes) != M => {
-            let what = Agreement::Axes;
-            let (found, expected) = (identity.axes.to_string(), M.to_string());
-            Err(port.refused(BoardError::Disagrees { what, found, expected }))
-        }
-        _ => Ok(connection),
-    }
+    let greeted = send::greet(&mut connection);
+    let linked = greeted.and_then(|()| match connection.identity() {
+        Some(identity) => BoardError::unless_linked(identity, M),
+        None => Err(BoardError::Silent),
+    });
+    linked.map(|()| connection).map_err(|error| port.refused(error))
 }
 
 fn of_board<const M: usize>(port: &PortArguments) -> Result<(Vec<u8>, Figures), CliError> {

@@ -28,8 +28,8 @@ impl PortArguments {
         CliError::Board { port: self.port.to_string(), source }
     }
 
-    /// Connects to the board of `N` axes there; a simulated one lives as long as what comes with the connection.
-    pub(super) fn connect<const N: usize>(
+    /// Starts the simulated board, and connects to it; it lives as long as what comes with the connection.
+    pub(super) fn simulated<const N: usize>(
         &self,
         machine: &Machine<N>,
     ) -> Result<(Connection<N>, SimulatedBoard), CliError> {

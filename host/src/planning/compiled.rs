@@ -38,7 +38,8 @@ pub(super) fn bytes<'a, const N: usize>(
     on_axis_count!(machine.axis_count(), M => bytes_of::<N, M>(machine, items))
 }
 
-fn bytes_of<'a, const N: usize, const M: usize>(
+/// The bytes of `items` for the first `M` axes of `machine`, as many as it has.
+pub(crate) fn bytes_of<'a, const N: usize, const M: usize>(
     machine: &Machine<N>,
     items: impl IntoIterator<Item = &'a Item<N>>,
 ) -> Vec<u8> {
@@ -56,8 +57,7 @@ pub(crate) fn header_of_axes<const N: usize, const M: usize>(header: &Header<N>)
     Header { tick_s, rules, pulse, axes: from_fn(|axis| axes[axis]), start: from_fn(|axis| start[axis]) }
 }
 
-/// The guards of the first `M` axes.
-pub(crate) fn guards_of_axes<const N: usize, const M: usize>(guards: &Guards<N>) -> Guards<M> {
+fn guards_of_axes<const N: usize, const M: usize>(guards: &Guards<N>) -> Guards<M> {
     Guards { axes: from_fn(|axis| guards.axes[axis]), reactions: guards.reactions }
 }
 

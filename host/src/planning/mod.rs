@@ -41,7 +41,7 @@ pub mod stretch;
 mod travel;
 
 pub use blocks::plan_blocks;
-pub(crate) use compiled::{first_axes, guards_of_axes, header_of_axes, on_axis_count};
+pub(crate) use compiled::{bytes_of, first_axes, header_of_axes, on_axis_count};
 pub use error::{Place, PlanningError, Problem};
 pub use executable::Executable;
 pub use outputs::require_outputs;

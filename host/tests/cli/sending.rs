@@ -120,6 +120,11 @@ fn a_program_stop_where_nobody_is() {
         outcome(&mut workspace.command(&["send", "part.ngc", "--port", "simulator", "--enable"]));
     assert_eq!(status, Some(3), "{out} {error}");
     assert!(out.contains("program stop at X 1.000 Y 0.000 Z 0.000: line 4 stops; clamp it"), "{out}");
+    let (status, _, error) = outcome(&mut workspace.command(&["board", "--listen", "nowhere"]));
+    assert!(
+        status == Some(2) && error.contains("expected an address of this computer that is free"),
+        "{error}"
+    );
     for (port, expected) in
         [("nowhere", "found `nowhere`, expected tcp:HOST:PORT"), ("tcp:127.0.0.1:1", "expected a board")]
     {

@@ -84,6 +84,8 @@ enum Session {
     Ready(u32),
     /// It is another one now; the caller has to begin anew.
     Lost(u32),
+    /// Somebody else has it.
+    Replaced,
 }
 
 /// What is asked for until it is answered.
@@ -103,7 +105,6 @@ pub struct HostLink<const AXES: usize, const ITEMS: usize, const BYTES: usize> {
     /// The number of the present hello, and of the first: an answer to one before is old.
     asker: u32,
     first_asker: u32,
-    is_replaced: bool,
     controls: Controls,
     /// The number of the controls that the board has confirmed.
     confirmed_controls: u32,
@@ -143,7 +144,6 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             session: Session::Unknown,
             asker,
             first_asker: asker,
-            is_replaced: false,
             controls: Controls::NONE,
             confirmed_controls: 0,
             bytes: Deque::new(),
@@ -365,11 +365,11 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
                         let is_own =
                             asker.wrapping_sub(self.first_asker) <= self.asker.wrapping_sub(self.first_asker);
                         if !is_own {
-                            (self.session, self.is_replaced) = (Session::Unknown, true);
+                            self.session = Session::Replaced;
                             self.drop_items();
                             on_event(Event::Replaced);
                         }
-                    } else if self.session != Session::Unknown {
+                    } else if ![Session::Unknown, Session::Replaced].contains(&self.session) {
                         // Old, or of a board that has started anew: ask.
                         self.asker = self.asker.wrapping_add(1);
                         self.is_asking = true;
@@ -386,7 +386,7 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
     fn is_of(&self, session: u32) -> bool {
         match self.session {
             Session::Greeted(known) | Session::Ready(known) => known == session,
-            Session::Unknown | Session::Lost(_) => false,
+            Session::Unknown | Session::Lost(_) | Session::Replaced => false,
         }
     }
 
@@ -398,7 +398,7 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         on_event: &mut impl FnMut(Event<AXES>),
     ) {
         self.is_asking = false;
-        if self.is_of(session) || self.session == Session::Lost(session) {
+        if self.is_of(session) || [Session::Lost(session), Session::Replaced].contains(&self.session) {
             return;
         }
         if identity.protocol != PROTOCOL || usize::from(identity.axes) != AXES {
@@ -471,15 +471,12 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         let is_due = |since_ms: Option<u32>, after_ms: u32| {
             since_ms.is_none_or(|since_ms| now_ms.wrapping_sub(since_ms) >= after_ms)
         };
-        if self.is_replaced {
-            return 0;
-        }
         if (self.session == Session::Unknown || self.is_asking) && is_due(self.hello_ms, REPEAT_MS) {
             self.hello_ms = Some(now_ms);
             return frame(&Request::Hello { asker: self.asker }, out);
         }
         let (session, is_ready) = match self.session {
-            Session::Unknown | Session::Lost(_) => return 0,
+            Session::Unknown | Session::Lost(_) | Session::Replaced => return 0,
             Session::Greeted(session) => (session, false),
             Session::Ready(session) => (session, true),
         };

@@ -633,3 +633,30 @@ fn who_asked_last_has_the_board() {
         assert!(!bench.host.press(Mode::Run));
     }
 }
+
+/// The first items of a program come again after it was given up, in the place of the next one's.
+#[test]
+fn a_late_frame_of_a_program_that_was_given_up_is_dropped() {
+    let mut bench = Bench::new(400, 0);
+    bench.greet();
+    assert!(bench.host.begin(1));
+    assert_eq!(bench.greet(), 0);
+    assert_eq!(bench.host.push(Some(&item(7))), Ok(true));
+    let mut out = [0; FRAME_MAX];
+    let feed = |board: &mut Board, frame: &[u8]| {
+        board.link.receive(&mut frame.iter().copied());
+        board.link.put_items(&mut board.items);
+        board.items.next()
+    };
+    let late = loop {
+        bench.now_ms = bench.now_ms.wrapping_add(1);
+        let length = bench.host.transmit(bench.now_ms, &mut out);
+        if feed(&mut bench.board, &out[..length]) == 1 {
+            break out[..length].to_vec();
+        }
+    };
+    assert!(bench.host.begin(2));
+    let length = bench.host.transmit(bench.now_ms, &mut out);
+    assert_eq!(feed(&mut bench.board, &out[..length]), 0, "the next program has begun");
+    assert_eq!(feed(&mut bench.board, &late), 0);
+}

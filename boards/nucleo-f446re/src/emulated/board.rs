@@ -14,7 +14,6 @@ use nucleo_f446re::machine::{AXES, Number, PROGRAM};
 use stm32f4xx_hal::gpio::{Alternate, PA3, PinState};
 use stm32f4xx_hal::pac::{self, SPI2};
 use stm32f4xx_hal::prelude::*;
-use stm32f4xx_hal::serial::SerialExt;
 use stm32f4xx_hal::spi::Spi;
 use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
@@ -138,16 +137,11 @@ impl Board {
 
         let receive: PA3<Alternate<7>> = gpioa.pa3.into_alternate();
         #[cfg(not(feature = "link"))]
-        let line = {
-            use nucleo_f446re::design_parameters::CONSOLE_BAUD;
-            match device.USART2.rx(receive, CONSOLE_BAUD.bps(), &mut rcc) {
-                Ok(console) => console,
-                Err(_) => defmt::panic!("console: {=u32} baud can't be had", CONSOLE_BAUD),
-            }
-        };
+        let line = crate::console_port::open(device.USART2, receive, &mut rcc);
         #[cfg(feature = "link")]
         let line = {
             use nucleo_f446re::design_parameters::LINK_BAUD;
+            use stm32f4xx_hal::serial::SerialExt;
             match device.USART2.serial::<u8>((gpioa.pa2, receive), LINK_BAUD.bps(), &mut rcc) {
                 Ok(serial) => Line::new(serial.release().0),
                 Err(_) => defmt::panic!("link: {=u32} baud can't be had", LINK_BAUD),

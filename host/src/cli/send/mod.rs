@@ -46,8 +46,9 @@ resets it, s switches single block. Ctrl-C holds; Ctrl-C again ends this command
 A board without this command comes to rest on the path where its items end. A cable that was out is noticed: the board is
 held when it is in again, and r goes on.
 
-Exit status: 0 done; 1 a fault, or the board was lost, reset, or asked by another sender; 2 the program or the board does not fit; 3 held, or at a
-program stop, and nobody there to resume (the end of standard input), or ended by SIGTERM; 4 aborted; 130 interrupted, the board is held.";
+Exit status: 0 done; 1 a fault, or the board was lost, reset, or asked by another sender; 2 the program or the board does
+not fit; 3 held, or at a program stop, and nobody there to resume (the end of standard input), or ended by SIGTERM; 4 aborted;
+130 interrupted, the board is held.";
 
 /// Drive a program on a board, and show what it does.
 #[derive(Debug, Args)]
@@ -117,7 +118,8 @@ fn send_plan<const N: usize>(
 ) -> Result<Outcome, CliError> {
     if arguments.port.port == Port::Simulator {
         let job = job::<f32, N, N>(plan, machine)?;
-        let (connection, _board) = arguments.port.connect(machine)?;
+        let (mut connection, _board) = arguments.port.simulated(machine)?;
+        greet(&mut connection).map_err(|error| arguments.port.refused(error))?;
         let stops = Stops::new(program, plan, &job);
         return drive(arguments, (&job, stops), machine, connection, out);
     }
@@ -143,7 +145,7 @@ fn job<R: Root, const N: usize, const M: usize>(
     Ok(Job::new(machine, &Executable::new::<R>(plan)?.items))
 }
 
-/// Waits for the board's answer.
+/// Waits for the board's answer: what it is.
 pub(super) fn greet<const M: usize>(connection: &mut Connection<M>) -> Result<(), BoardError> {
     let mut lost = None;
     for _ in 0..200 {
@@ -212,14 +214,15 @@ fn drive<const N: usize, const M: usize>(
         found,
     };
     let mut sender = Sender::new(job, &names, may);
-    // A greeting that was heard already.
     if let Some(identity) = connection.identity() {
         sender.check(identity).map_err(refused)?;
+        let program = arguments.program.display().to_string();
+        check_outputs(&program, job, identity.outputs).map_err(refused)?;
     }
     let keys = keys(arguments);
     let mut shown = Shown::new(arguments, &names, stops, job.items.len() as u64);
     interrupt::hold_first();
-    let (mut is_attended, mut is_checked, mut waits_since) = (true, false, Instant::now());
+    let (mut is_attended, mut waits_since) = (true, Instant::now());
     loop {
         let mut heard = Vec::new();
         connection.step(Duration::from_millis(2), &mut |one| heard.push(one));
@@ -232,11 +235,6 @@ fn drive<const N: usize, const M: usize>(
                 Heard::Board(_) => {}
             }
             sender.hear(&one).map_err(refused)?;
-        }
-        if let (false, Some(identity)) = (is_checked, connection.identity()) {
-            check_outputs(&arguments.program.display().to_string(), job, identity.outputs)
-                .map_err(refused)?;
-            is_checked = true;
         }
         if let Some(asked) = interrupt::take_asked() {
             sender.hold(&mut connection);
