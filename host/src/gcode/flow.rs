@@ -319,7 +319,9 @@ impl<'a> Flow<'a> {
 
     /// A file of subroutines alone is right if all of it can be read.
     fn check_subroutines(&self) -> Result<(), GcodeError> {
-        let has_steps = self.interpreter.program.steps.iter().any(|step| step.kind != StepKind::End);
+        let program = &self.interpreter.program;
+        let has_steps =
+            self.interpreter.taken[0] > 0 || program.steps.iter().any(|step| step.kind != StepKind::End);
         let Some(file) = self.library.file(0).filter(|file| !has_steps && file.has_subs()) else {
             return Ok(());
         };

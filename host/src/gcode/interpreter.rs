@@ -1,5 +1,6 @@
 //! Executes the lines, in the order RS-274 gives to the words of a line.
 
+use std::mem::take;
 use std::rc::Rc;
 
 use super::axis::{Axis, ORIGIN, Point};
@@ -17,7 +18,7 @@ use super::options::ReadOptions;
 use super::parameter_file;
 use super::parameters::{Parameters, SELECTED};
 use super::probe::Probe;
-use super::program::{Message, Notice, NoticeKind, Outputs, Program, Step, StepKind};
+use super::program::{Batch, Message, Notice, NoticeKind, Outputs, Program, Step, StepKind};
 use super::tool::ToolTable;
 
 /// Feeds beyond are no feeds \[mm/min\].
@@ -75,6 +76,8 @@ pub(super) struct Interpreter {
     optional_stop: bool,
     /// Most steps, most messages, and most control points of a NURBS.
     pub(super) steps_max: usize,
+    /// Steps and messages that were taken out of the program before.
+    pub(super) taken: [usize; 2],
     message_bytes: usize,
     /// A word or a tape mark was read.
     pub(super) begun: bool,
@@ -145,6 +148,7 @@ impl Interpreter {
             line: 0,
             optional_stop: options.optional_stop,
             steps_max: options.steps_max,
+            taken: [0; 2],
             message_bytes: 0,
             begun: false,
             ended: false,
@@ -229,7 +233,7 @@ impl Interpreter {
 
     /// Appends a step.
     pub(super) fn step(&mut self, kind: StepKind) -> Result<(), Located> {
-        if self.program.steps.len() >= self.steps_max {
+        if self.taken[0] + self.program.steps.len() >= self.steps_max {
             return Err(Located::new(0, Problem::TooManySteps { steps_max: self.steps_max }));
         }
         self.cubic_before_mm = None;
@@ -250,12 +254,25 @@ impl Interpreter {
     /// Shows a text to the operator before the next step.
     pub(super) fn message(&mut self, text: String) -> Result<(), Located> {
         self.message_bytes = self.message_bytes.saturating_add(text.len());
-        if self.program.messages.len() >= self.steps_max || self.message_bytes > MESSAGE_BYTES_MAX {
+        if self.taken[1] + self.program.messages.len() >= self.steps_max
+            || self.message_bytes > MESSAGE_BYTES_MAX
+        {
             return Err(Located::new(0, Problem::TooManySteps { steps_max: self.steps_max }));
         }
         let step = self.program.steps.len();
         self.program.messages.push(Message { line: self.line, within: None, step, text });
         Ok(())
+    }
+
+    /// Takes the steps and messages that no later line changes any more; none while cutter compensation may.
+    pub(super) fn take(&mut self) -> Option<Batch> {
+        if self.cutter.is_some() {
+            return None;
+        }
+        let Program { steps, nurbs, messages, .. } = &mut self.program;
+        let (steps, nurbs, messages) = (take(steps), take(nurbs), take(messages));
+        self.taken = [self.taken[0] + steps.len(), self.taken[1] + messages.len()];
+        Some(Batch { steps, nurbs, messages })
     }
 
     /// Ends the program; the next one starts in the first coordinate system.

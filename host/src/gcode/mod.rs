@@ -157,6 +157,7 @@ mod polar;
 mod predefined;
 mod probe;
 mod program;
+mod reading;
 mod source;
 mod spline;
 mod structure;
@@ -174,9 +175,10 @@ pub use parameter_file::ParameterFile;
 pub use parameters::{PARAMETER_MAX, Parameters};
 pub use probe::Probe;
 pub use program::{
-    ArcMove, CubicMove, Feed, LineMove, Message, Notice, NoticeKind, Nurbs, NurbsMove, Outputs, PathMode,
-    Plane, ProbeMove, Program, SpindleSpeed, Step, StepKind, Systems, ThroughMove,
+    ArcMove, Batch, CubicMove, Feed, LineMove, Message, Notice, NoticeKind, Nurbs, NurbsMove, Outputs,
+    PathMode, Plane, ProbeMove, Program, SpindleSpeed, Step, StepKind, Systems, ThroughMove,
 };
+pub use reading::Reading;
 pub use survey::{Refusal, refusals};
 pub use tool::{Tool, ToolTable};
 

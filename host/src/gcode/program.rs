@@ -32,6 +32,17 @@ pub struct Program {
     pub parameters: Parameters,
 }
 
+/// A part of a program, in its order.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Batch {
+    /// The steps.
+    pub steps: Vec<Step>,
+    /// The curves of [`NurbsMove`]s among them.
+    pub nurbs: Vec<Nurbs>,
+    /// What the operator is to read; a message's step is the index in this part.
+    pub messages: Vec<Message>,
+}
+
 /// A set of coordinate systems, 1 for G54 to 9 for G59.3.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Systems(u16);

@@ -5,7 +5,7 @@
 //! refused with its line.
 
 use super::error::Problem;
-use super::program::move_at;
+use super::runs::move_at;
 use crate::gcode::{Axis, CubicMove, Nurbs, NurbsMove, PathMode};
 use crate::machine::Machine;
 use crate::toolpath::rational::spans;

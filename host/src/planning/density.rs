@@ -10,8 +10,6 @@ use motion_kernel::law::Ticks;
 use motion_kernel::queue::SEGMENTS_PER_TICK_MAX;
 
 use super::error::Problem;
-use super::stretch::Stretch;
-use crate::toolpath::Placed;
 
 /// The times at which the latest short pieces end, and where on the path \[s, mm\].
 #[derive(Default)]
@@ -22,32 +20,27 @@ pub(super) struct PiecePace {
 }
 
 impl PiecePace {
-    /// The pieces of the next stretch; `blocks` holds the index of each one's block. An error comes with
-    /// the program line.
-    pub(super) fn stretch<const N: usize>(
+    /// The next piece of a stretch, below a ceiling, which ends at a time \[s\] and a place \[mm\] of it.
+    pub(super) fn piece(
         &mut self,
-        stretch: &Stretch<N>,
-        pieces: &[Placed<N>],
-        blocks: &[usize],
+        (time_s, end_mm): (f64, f64),
+        length_mm: f64,
+        ceiling_mm_s: f64,
         tick_s: f64,
-    ) -> Result<(), (u32, Problem)> {
-        let (start_s, start_mm) = self.start;
-        let mut s_mm = 0.0;
-        for (piece, &block) in pieces.iter().zip(blocks) {
-            let length_mm = piece.length.to_mm();
-            s_mm += length_mm;
-            let block = &stretch.blocks[block];
-            if length_mm >= block.ceiling.feed_mm_s * tick_s {
-                // It takes a tick at least by itself: nothing before it can share one with what follows.
-                self.ends.clear();
-                continue;
-            }
-            let (_, time_s) = stretch.profile.at(s_mm);
-            self.ends.push_back((start_s + time_s, start_mm + s_mm));
-            self.check(tick_s).map_err(|problem| (block.line, problem))?;
+    ) -> Result<(), Problem> {
+        if length_mm >= ceiling_mm_s * tick_s {
+            // It takes a tick at least by itself: nothing before it can share one with what follows.
+            self.ends.clear();
+            return Ok(());
         }
-        self.start = (start_s + stretch.profile.time_s(), start_mm + s_mm);
-        Ok(())
+        self.ends.push_back((self.start.0 + time_s, self.start.1 + end_mm));
+        self.check(tick_s)
+    }
+
+    /// The stretch has ended, after a time \[s\] and a length \[mm\].
+    pub(super) fn end(&mut self, (time_s, length_mm): (f64, f64)) {
+        self.start.0 += time_s;
+        self.start.1 += length_mm;
     }
 
     /// The machine rests.

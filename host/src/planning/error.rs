@@ -55,6 +55,9 @@ pub enum Problem {
     /// The parts of a NURBS do not belong together. What is read from G-code does.
     #[error("found a NURBS without its curve, expected one with weights and knots that fit its degree")]
     Nurbs,
+    /// A probing move for a board.
+    #[error("found a probing move, expected none: a board has no probe input yet")]
+    NoProbeInput,
     /// A limit that results for the block is unusable.
     #[error("found {} limit {}, expected a positive finite number", .0.quantity, .0.value)]
     Limit(#[from] LimitError),

@@ -1,6 +1,9 @@
 //! The kernel's planner over a list of blocks, in the host's memory.
+//!
+//! [`LookAhead`] plans a path that grows. What is known of it is planned to rest at its end; then the ramps are settled up to
+//! a place that more path does not change: where the feed is at a minimum, or level at a ceiling.
 
-use motion_kernel::law::PlannedRamp;
+use motion_kernel::law::{PlannedRamp, Ramp};
 use motion_kernel::plan::{Block, BlockPlan, Effort, Memory, Node, Path, PlanError, nodes_for, plan_ramps};
 use motion_kernel::units::Position;
 
@@ -23,12 +26,174 @@ pub(super) fn lookahead(
     for (index, &end_mm) in ends_mm.iter().enumerate() {
         ends.push(on_path(end_mm).map_err(|error| (index, error.into()))?);
     }
-    let plan = |feeds_mm_s| planned(blocks, &ends, feeds_mm_s, mode, tick_s);
+    over(blocks, &ends, feeds_mm_s, mode, tick_s)
+}
+
+fn over(
+    blocks: &[Block<f64>],
+    ends: &[Position],
+    feeds_mm_s: [f64; 2],
+    mode: Mode,
+    tick_s: f64,
+) -> Result<Vec<PlannedRamp>, (usize, Problem)> {
+    let plan = |feeds_mm_s| planned(blocks, ends, feeds_mm_s, mode, tick_s);
     plan(feeds_mm_s).map_err(|error| match error {
-        PlanError::Ramp { start, error } => (block_at(&ends, start), Problem::Segment { error, tick_s }),
+        PlanError::Ramp { start, error } => (block_at(ends, start), Problem::Segment { error, tick_s }),
         PlanError::Block { block, .. } => (block, error.into()),
         _ => (0, greatest(error, feeds_mm_s, |feeds_mm_s| plan(feeds_mm_s).is_ok()).into()),
     })
+}
+
+/// A path from rest that grows.
+pub(super) struct LookAhead {
+    mode: Mode,
+    tick_s: f64,
+    /// Blocks that are not settled to their ends, and where they end.
+    blocks: Vec<Block<f64>>,
+    ends: Vec<Position>,
+    /// Blocks before them.
+    before: usize,
+    /// Ramps are settled up to here; the feed there \[mm/s\].
+    settled: Position,
+    feed_mm_s: f64,
+    /// The ramps behind that, to rest at the end of the path as it was known, and that end.
+    rest: (Vec<PlannedRamp>, Position),
+}
+
+impl LookAhead {
+    /// A path without blocks.
+    pub(super) fn new(mode: Mode, tick_s: f64) -> Self {
+        Self {
+            mode,
+            tick_s,
+            blocks: Vec::new(),
+            ends: Vec::new(),
+            before: 0,
+            settled: Position::ZERO,
+            feed_mm_s: 0.0,
+            rest: (Vec::new(), Position::ZERO),
+        }
+    }
+
+    /// The path goes on with a block, which ends at `end`.
+    pub(super) fn push(&mut self, block: Block<f64>, end: Position) {
+        self.blocks.push(block);
+        self.ends.push(end);
+    }
+
+    /// The greatest feed from the last block to the one that is pushed next.
+    pub(super) fn set_junction(&mut self, junction_mm_s: f64) {
+        if let Some(last) = self.blocks.last_mut() {
+            last.junction_mm_s = junction_mm_s;
+        }
+    }
+
+    /// Appends the ramps that are settled; all, if the path ends here. An error comes with the index of the block.
+    pub(super) fn settle(
+        &mut self,
+        goes_on: bool,
+        ramps: &mut Vec<PlannedRamp>,
+    ) -> Result<(), (usize, Problem)> {
+        // S3's plan is one for the whole stretch.
+        if self.blocks.is_empty() || goes_on && self.mode == Mode::PerBlock {
+            return Ok(());
+        }
+        let mut planned = match self.planned() {
+            Ok(planned) => planned,
+            // Where it was planned to rest, it may.
+            Err(_) if !self.rest.0.is_empty() => {
+                let (rest, end) = std::mem::take(&mut self.rest);
+                ramps.extend(rest);
+                self.go_on(end, 0.0);
+                self.planned().map_err(|(block, problem)| (self.before + block, problem))?
+            }
+            Err((block, problem)) => return Err((self.before + block, problem)),
+        };
+        if !goes_on {
+            ramps.append(&mut planned);
+            *self = Self::new(self.mode, self.tick_s);
+            return Ok(());
+        }
+        let end = self.ends.last().copied().unwrap_or(self.settled);
+        if let Some((count, within)) = self.settled_of(&planned) {
+            let mut rest = planned.split_off(count);
+            ramps.append(&mut planned);
+            let start = planned_end(ramps, self.settled, count);
+            if let (Some(within), Some(cruise)) = (within, rest.first_mut()) {
+                let (done, left) = divided(*cruise, within - start);
+                ramps.push(done);
+                *cruise = left;
+            }
+            let feed_mm_s = rest.first().map_or(0.0, |next| next.ramp.from_mm_s);
+            self.go_on(within.unwrap_or(start), feed_mm_s);
+            planned = rest;
+        }
+        self.rest = (planned, end);
+        Ok(())
+    }
+
+    fn go_on(&mut self, from: Position, feed_mm_s: f64) {
+        (self.settled, self.feed_mm_s) = (from, feed_mm_s);
+        let done = self.ends.partition_point(|&end| end <= from);
+        self.blocks.drain(..done);
+        self.ends.drain(..done);
+        self.before += done;
+    }
+
+    /// From the settled place to rest at the end of what is known.
+    fn planned(&self) -> Result<Vec<PlannedRamp>, (usize, Problem)> {
+        let (mut blocks, mut ends) = (self.blocks.clone(), self.ends.clone());
+        ends.iter_mut().for_each(|end| *end = *end - self.settled);
+        if let (Some(first), Some(end)) = (blocks.first_mut(), ends.first()) {
+            // The part of it that is left.
+            first.length_mm = first.length_mm.min(end.to_mm());
+        }
+        over(&blocks, &ends, [self.feed_mm_s, 0.0], self.mode, self.tick_s)
+    }
+
+    /// How many of these ramps more path does not change, and up to which place of the one behind, a cruise.
+    fn settled_of(&self, planned: &[PlannedRamp]) -> Option<(usize, Option<Position>)> {
+        let (mut start, mut found, mut fell) = (self.settled, None, false);
+        for (index, PlannedRamp { ramp, length }) in planned.iter().enumerate() {
+            let (end, is_rise) = (start + *length, ramp.to_mm_s > ramp.from_mm_s);
+            let is_first = index == 0;
+            if ramp.is_cruise() && self.is_ceiling(start, ramp.from_mm_s) {
+                let within =
+                    self.ends.iter().rev().find(|&&block| block < end).filter(|&&block| block > start);
+                if !is_first || within.is_some() {
+                    found = Some((index, within.copied()));
+                }
+            } else if is_rise && fell && !is_first {
+                found = Some((index, None));
+            }
+            fell = !is_rise && (!ramp.is_cruise() || fell);
+            start = end;
+        }
+        found
+    }
+
+    /// Whether nothing on the block at a place is faster.
+    fn is_ceiling(&self, at: Position, feed_mm_s: f64) -> bool {
+        let block = self.blocks.get(block_at(&self.ends, at));
+        block.is_some_and(|block| feed_mm_s >= block.cap_mm_s * CEILING)
+    }
+}
+
+/// Feeds from this part of a ceiling on are at it.
+const CEILING: f64 = 1.0 - 1.0e-9;
+
+/// Where the last `count` of `ramps` end, which start at `start`.
+fn planned_end(ramps: &[PlannedRamp], start: Position, count: usize) -> Position {
+    ramps.iter().rev().take(count).fold(start, |end, planned| end + planned.length)
+}
+
+/// A cruise in two, the first of which is `length` long.
+fn divided(PlannedRamp { ramp, length: all }: PlannedRamp, length: Position) -> (PlannedRamp, PlannedRamp) {
+    let over = |length: Position| PlannedRamp {
+        ramp: Ramp::cruise(ramp.from_mm_s, length.to_mm() / ramp.from_mm_s),
+        length,
+    };
+    (over(length), over(all - length))
 }
 
 fn planned(

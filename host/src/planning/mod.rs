@@ -1,7 +1,7 @@
 //! Programs and block lists to feed plans.
 //!
 //! Consumes G-code steps or a BLOCKS.json; produces a [`Plan`]: every block with its ceiling and the
-//! reason for it, the feed over the path, and what the kernel needs to execute it. Plans whole
+//! reason for it, the feed over the path, and what the kernel needs to execute it. Plans
 //! stretches, from one full stop to the next, in f64.
 //!
 //! **Limits.** A dwell, and a part of a move at constant feed or acceleration, may last 2³¹ ticks: twelve
@@ -9,17 +9,22 @@
 //! path lies within one kilometre of the origin on each axis (a rotary one: 10⁶ °). Anything beyond is refused, with
 //! the line of the block.
 //!
-//! - [`program`]: steps to stretches: where motion must stop;
+//! - `runs`: steps to runs of moves: where motion must stop, and where long runs are cut;
+//! - `sections`: several runs smoothed at once;
 //! - `blending`: stretches to blocks: the choice of the junctions that are blended;
 //! - [`outputs`]: spindle and coolant: what the machine switches;
 //! - `ceilings`: the ceiling of a move or a blend, and of a junction;
 //! - `curves`: programmed curves to moves;
 //! - [`spline`]: a spline to one stretch, and how far its pieces are from it;
+//! - `lookahead`: the kernel's planner in the host's memory, over a path that grows;
 //! - [`stretch`]: ceilings, look-ahead and ramps of one stretch;
-//! - `lookahead`: the kernel's planner in the host's memory;
+//! - `pipeline`: all of these, part by part;
+//! - [`program`]: a whole program to one plan;
 //! - [`profile`]: feed and time at any path position of a planned stretch;
 //! - [`blocks`]: bare block lists, BLOCKS.json;
-//! - [`executable`]: a plan in the kernel's terms;
+//! - `items`: blocks and ramps in the kernel's terms;
+//! - [`executable`]: a whole plan in these;
+//! - [`stream`]: a program while it is read;
 //! - `compiled`: a plan as bytes for a board;
 //! - `density`: refuses what is too dense for a tick;
 //! - [`error`]: refusals, with file and line.
@@ -30,6 +35,10 @@ mod ceilings;
 mod compiled;
 mod curves;
 mod density;
+mod items;
+mod pipeline;
+mod runs;
+mod sections;
 pub mod error;
 pub mod executable;
 mod lookahead;
@@ -37,6 +46,7 @@ pub mod outputs;
 pub mod profile;
 pub mod program;
 pub mod spline;
+pub mod stream;
 pub mod stretch;
 mod travel;
 
@@ -48,6 +58,7 @@ pub use outputs::require_outputs;
 pub use profile::PlacedRamp;
 pub use program::{plan_moves, plan_program};
 pub use spline::plan_spline;
+pub use stream::{Stream, Streamed};
 pub use stretch::Stretch;
 
 use motion_kernel::hal::OutputState;

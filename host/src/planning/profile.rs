@@ -4,7 +4,7 @@ use motion_kernel::law::PlannedRamp;
 use motion_kernel::plan::BlockPlan;
 
 /// Positions closer than this are the same: ramps start and end on position steps, blocks do not.
-const ROUNDING_MM: f64 = 1.0e-9;
+pub(super) const ROUNDING_MM: f64 = 1.0e-9;
 
 /// The feed over a stretch.
 #[derive(Clone, Debug, Default)]
@@ -95,7 +95,7 @@ impl PlacedRamp {
     }
 
     /// Feed \[mm/s\] and time \[s\] at `s_mm`, counted as its start.
-    fn at(&self, s_mm: f64) -> (f64, f64) {
+    pub(super) fn at(&self, s_mm: f64) -> (f64, f64) {
         let (ramp, local_mm) = (self.planned.ramp, s_mm - self.start_mm);
         if local_mm <= ROUNDING_MM {
             return (ramp.from_mm_s, self.start_s);

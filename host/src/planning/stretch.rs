@@ -1,12 +1,15 @@
 //! One stretch, from full stop to full stop: ceilings, look-ahead, ramps.
 
+use motion_kernel::law::PlannedRamp;
 use motion_kernel::plan::{Block, Ceiling};
 
 use super::Mode;
+use super::ceilings::junction_feed;
 use super::error::Problem;
-use super::lookahead::lookahead;
+use super::lookahead::LookAhead;
 use super::profile::FeedProfile;
-use crate::toolpath::Element;
+use crate::machine::Machine;
+use crate::toolpath::{Element, on_path};
 use crate::trace::TracedBlock;
 
 /// A block of a stretch, before planning.
@@ -37,6 +40,123 @@ impl<const N: usize> StretchBlock<N> {
     }
 }
 
+/// What becomes known of a path that grows, in its order. A ramp may come before the blocks it spans.
+pub(super) enum Known<const N: usize> {
+    /// The next block.
+    Block(StretchBlock<N>),
+    /// The next ramp or cruise.
+    Ramp(PlannedRamp),
+    /// The stretch ends here, at rest.
+    End,
+}
+
+/// Stretches that grow block by block.
+pub(super) struct Growing<'m, const N: usize> {
+    machine: &'m Machine<N>,
+    ahead: LookAhead,
+    /// The last block, until the feed to the next one is known.
+    last: Option<StretchBlock<N>>,
+    end_mm: f64,
+    ramps: Vec<PlannedRamp>,
+    /// Lines of the blocks of this stretch, in runs: from which block on.
+    lines: Vec<(usize, u32)>,
+    blocks: usize,
+    /// The last block is the last one of a section.
+    is_cut: bool,
+}
+
+impl<'m, const N: usize> Growing<'m, N> {
+    /// Before the first block.
+    pub(super) fn new(machine: &'m Machine<N>, mode: Mode) -> Self {
+        let ahead = LookAhead::new(mode, machine.tick_s);
+        Self {
+            machine,
+            ahead,
+            last: None,
+            end_mm: 0.0,
+            ramps: Vec::new(),
+            lines: Vec::new(),
+            blocks: 0,
+            is_cut: false,
+        }
+    }
+
+    /// Takes a section's blocks; the path goes on behind them without a stop, or not. An error comes with the program line.
+    pub(super) fn take(
+        &mut self,
+        blocks: Vec<StretchBlock<N>>,
+        goes_on: bool,
+        known: &mut impl FnMut(Known<N>) -> Result<(), (u32, Problem)>,
+    ) -> Result<(), (u32, Problem)> {
+        for block in blocks {
+            if let Some(mut last) = self.last.take() {
+                // Within a section it is known already.
+                if std::mem::take(&mut self.is_cut) {
+                    last.junction_mm_s = junction_feed(&last.element, &block.element, self.machine);
+                    self.ahead.set_junction(last.junction_mm_s);
+                }
+                self.give(last, known)?;
+            }
+            self.end_mm += block.element.length_mm();
+            let end = on_path(self.end_mm).map_err(|error| (block.line, error.into()))?;
+            self.ahead.push(block.for_lookahead(), end);
+            if self.lines.last().is_none_or(|&(_, line)| line != block.line) {
+                self.lines.push((self.blocks, block.line));
+            }
+            self.blocks += 1;
+            self.last = Some(block);
+        }
+        if goes_on {
+            self.is_cut = true;
+            return self.settle(true, known);
+        }
+        self.end(known)
+    }
+
+    /// The path ends here, at rest, if it has not yet.
+    pub(super) fn end(
+        &mut self,
+        known: &mut impl FnMut(Known<N>) -> Result<(), (u32, Problem)>,
+    ) -> Result<(), (u32, Problem)> {
+        self.is_cut = false;
+        match self.last.take() {
+            Some(last) => self.give(StretchBlock { junction_mm_s: 0.0, ..last }, known),
+            None => Ok(()),
+        }
+    }
+
+    /// Gives out a block, and ends the stretch where motion stops behind it.
+    fn give(
+        &mut self,
+        block: StretchBlock<N>,
+        known: &mut impl FnMut(Known<N>) -> Result<(), (u32, Problem)>,
+    ) -> Result<(), (u32, Problem)> {
+        known(Known::Block(block))?;
+        if block.junction_mm_s > 0.0 {
+            return Ok(());
+        }
+        self.settle(false, known)?;
+        (self.end_mm, self.blocks) = (0.0, 0);
+        self.lines.clear();
+        known(Known::End)
+    }
+
+    fn settle(
+        &mut self,
+        goes_on: bool,
+        known: &mut impl FnMut(Known<N>) -> Result<(), (u32, Problem)>,
+    ) -> Result<(), (u32, Problem)> {
+        let settled = self.ahead.settle(goes_on, &mut self.ramps);
+        settled.map_err(|(block, problem)| (self.line_of(block), problem))?;
+        self.ramps.drain(..).try_for_each(|ramp| known(Known::Ramp(ramp)))
+    }
+
+    fn line_of(&self, block: usize) -> u32 {
+        let runs = self.lines.partition_point(|&(first, _)| first <= block);
+        runs.checked_sub(1).and_then(|run| self.lines.get(run)).map_or(0, |&(_, line)| line)
+    }
+}
+
 /// A planned stretch.
 #[derive(Clone, Debug)]
 pub struct Stretch<const N: usize = 3> {
@@ -51,26 +171,15 @@ pub struct Stretch<const N: usize = 3> {
 }
 
 impl<const N: usize> Stretch<N> {
-    /// Plans blocks that start and end at rest. An error comes with the program line.
-    pub(super) fn new(
-        blocks: Vec<StretchBlock<N>>,
-        start_mm: f64,
-        mode: Mode,
-        tick_s: f64,
-    ) -> Result<Self, (u32, Problem)> {
-        let mut end_mm = 0.0;
-        let mut ends_mm = Vec::with_capacity(blocks.len());
-        let mut plan_blocks = Vec::with_capacity(blocks.len());
-        for block in &blocks {
-            let block = block.for_lookahead();
-            end_mm += block.length_mm;
-            ends_mm.push(end_mm);
-            plan_blocks.push(block);
-        }
-        let at_line = |(block, problem): (usize, Problem)| (blocks[block].line, problem);
-        let planned = lookahead(&plan_blocks, &ends_mm, [0.0; 2], mode, tick_s).map_err(at_line)?;
-        let profile = FeedProfile::new(&planned);
-        Ok(Self { start_mm, blocks, ends_mm, profile })
+    /// A stretch of blocks with the ramps over them.
+    pub(super) fn new(start_mm: f64, blocks: Vec<StretchBlock<N>>, ramps: &[PlannedRamp]) -> Self {
+        let lengths_mm = blocks.iter().map(|block| block.element.length_mm());
+        let ends_mm = lengths_mm.scan(0.0, |end_mm, length_mm| {
+            *end_mm += length_mm;
+            Some(*end_mm)
+        });
+        let ends_mm = ends_mm.collect();
+        Self { start_mm, blocks, ends_mm, profile: FeedProfile::new(ramps) }
     }
 
     /// Path position of every block's end, from the stretch's start \[mm\].

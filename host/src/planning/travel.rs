@@ -1,43 +1,31 @@
 //! Refuses a program that leaves the travel of the axes.
 //!
-//! Consumes the pieces that would be executed; fails with the line of the first one that leaves the travel.
+//! Consumes the items that would be executed; fails with the line of the first one that leaves the travel.
 
 use motion_kernel::path::Piece;
 use motion_kernel::program::Item;
 
-use super::error::{PlanningError, Problem};
-use super::executable::Executable;
+use super::error::Problem;
 use crate::axis_unit::AxisUnit;
 use crate::gcode::Point;
 use crate::machine::{AxisSettings, Machine};
 
-/// # Errors
-/// A piece leaves the travel of an axis, at its ends or between them.
-pub(super) fn check<const N: usize>(
-    source_name: &str,
-    executable: &Executable<N>,
-    machine: &Machine<N>,
-) -> Result<(), PlanningError> {
-    let travel = machine.travel();
-    for item in executable.supplied() {
-        let Ok(item) = item;
-        let (line, piece) = match item {
-            Item::Line { line, start, direction, length } => {
-                (line, Piece::<f64, N>::line(line, start, direction, length))
-            }
-            Item::Septic { line, start, coefficients, length } => {
-                (line, Piece::<f64, N>::septic(line, start, coefficients, length))
-            }
-            _ => continue,
-        };
-        // What is no piece was refused before.
-        let Ok(piece) = piece else { continue };
-        let Some((axis, found_mm)) = piece.beyond(&travel) else { continue };
-        let axis = &machine.axes[axis];
-        let problem = beyond(axis, found_mm, axis.travel_mm.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]));
-        return Err(PlanningError { source_name: source_name.to_owned(), place: line.into(), problem });
-    }
-    Ok(())
+/// Refuses a piece that leaves the travel at its ends or between them. An error comes with the program line.
+pub(super) fn check<const N: usize>(item: &Item<N>, machine: &Machine<N>) -> Result<(), (u32, Problem)> {
+    let (line, piece) = match *item {
+        Item::Line { line, start, direction, length } => {
+            (line, Piece::<f64, N>::line(line, start, direction, length))
+        }
+        Item::Septic { line, start, coefficients, length } => {
+            (line, Piece::<f64, N>::septic(line, start, coefficients, length))
+        }
+        _ => return Ok(()),
+    };
+    // What is no piece was refused before.
+    let Ok(piece) = piece else { return Ok(()) };
+    let Some((axis, found_mm)) = piece.beyond(&machine.travel()) else { return Ok(()) };
+    let axis = &machine.axes[axis];
+    Err((line, beyond(axis, found_mm, axis.travel_mm.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]))))
 }
 
 /// Refuses a point beyond the travel: the programmed end of a probing move, wherever the move ends.

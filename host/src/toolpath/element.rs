@@ -218,7 +218,7 @@ impl<const N: usize> Element<N> {
 
     /// A line or an arc in two, which meet in one point, the first of them `share` of it. Polynomials and
     /// involutes stay whole, twice.
-    pub(super) fn split(&self, share: f64) -> [Self; 2] {
+    pub(crate) fn split(&self, share: f64) -> [Self; 2] {
         match *self {
             Self::Line { from, to } => {
                 let middle = add(from, scale(subtract(to, from), share));

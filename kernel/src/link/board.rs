@@ -254,7 +254,8 @@ impl BoardLink {
         if !core::mem::take(&mut self.has_items) {
             return false;
         }
-        let Some((Request::Items { first, is_last, .. }, bytes)) = take::<Request>(self.deframer.payload()) else {
+        let Some((Request::Items { first, is_last, .. }, bytes)) = take::<Request>(self.deframer.payload())
+        else {
             return false;
         };
         self.is_taken_due = true;

@@ -536,7 +536,8 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             return 0;
         }
         let (asker, aborts, first) = (self.asker, self.controls.aborts, self.next);
-        let Some(mut payload) = Payload::of(&Request::Items { session, asker, aborts, first, is_last }) else {
+        let Some(mut payload) = Payload::of(&Request::Items { session, asker, aborts, first, is_last })
+        else {
             return 0;
         };
         if !payload.push_all(self.bytes.iter().copied().skip(skipped).take(length)) {

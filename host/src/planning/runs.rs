@@ -1,0 +1,264 @@
+//! Steps of a program to runs of moves: where the motion must stop, and where a long run is cut.
+//!
+//! **Sections.** A run without a stop may be as long as the program. It is cut into sections, each of which is smoothed by
+//! itself, so that motion begins before all is planned, and in bounded memory. Where it is cut depends on the moves alone.
+//! A cut is in the middle of a straight move or an arc, the longest of the later half: nothing steps there, and blends
+//! take at most half of a move anyhow.
+
+use std::mem::take;
+
+use motion_kernel::hal::OutputState;
+
+use super::curves::{Point, cubic, nurbs, through};
+use super::error::Problem;
+use super::outputs::Switches;
+use super::travel;
+use crate::gcode::{Feed, LineMove, Message, Nurbs, PathMode, ProbeMove, Step, StepKind};
+use crate::machine::Machine;
+use crate::toolpath::smooth::Move;
+use crate::toolpath::{Element, Feeds, Vector};
+
+/// Moves of the first section of a program, and of the longest one: each is twice as long as the one before, so that
+/// motion begins soon.
+const SECTION: [usize; 2] = [64, 1024];
+
+/// A part of a program for a machine.
+#[derive(Clone, Debug)]
+pub(super) enum Part<const N: usize> {
+    /// Moves that follow each other without a stop.
+    Moves {
+        /// The moves, one at least.
+        moves: Vec<Move<N>>,
+        /// The next part goes on without a stop.
+        goes_on: bool,
+    },
+    /// A probing move; its motion is the next part, unless it stands.
+    Probe { line: u32, probe: ProbeMove },
+    /// Rest.
+    Dwell { line: u32, seconds: f64 },
+    /// Spindle and coolant switch.
+    Switch { line: u32, to: OutputState },
+    /// Program stop.
+    Stop {
+        line: u32,
+        /// What the program says of it.
+        said: String,
+    },
+}
+
+/// Makes parts of steps.
+pub(super) struct Runs<'m, const N: usize> {
+    machine: &'m Machine<N>,
+    switches: Switches<'m, N>,
+    run: Vec<Move<N>>,
+    /// Where the spline begins whose points are being collected, and these.
+    start: Vector<N>,
+    points: Vec<Point<N>>,
+    /// Moves of the next section.
+    section: usize,
+    parts: Vec<Part<N>>,
+    /// Messages since the last program stop, each with its line.
+    said: Vec<(u32, String)>,
+}
+
+/// An error comes with the program line.
+type AtLine<T> = Result<T, (u32, Problem)>;
+
+impl<'m, const N: usize> Runs<'m, N> {
+    /// Before the first step.
+    pub(super) fn new(machine: &'m Machine<N>) -> Self {
+        Self {
+            machine,
+            switches: Switches::new(machine),
+            run: Vec::new(),
+            start: [0.0; N],
+            points: Vec::new(),
+            section: SECTION[0],
+            parts: Vec::new(),
+            said: Vec::new(),
+        }
+    }
+
+    /// The parts that are known, which are taken.
+    pub(super) fn parts(&mut self) -> Vec<Part<N>> {
+        take(&mut self.parts)
+    }
+
+    /// How many of them have moves.
+    pub(super) fn waiting(&self) -> usize {
+        self.parts.iter().filter(|part| matches!(part, Part::Moves { .. })).count()
+    }
+
+    /// The program says something before the next step.
+    pub(super) fn say(&mut self, message: &Message) {
+        self.said.push((message.line, message.text.clone()));
+    }
+
+    /// Takes a step; `curves` are those of its batch.
+    pub(super) fn step(&mut self, step: &Step, curves: &[Nurbs]) -> AtLine<()> {
+        let (line, machine) = (step.line, self.machine);
+        let at = |problem: Problem| (line, problem);
+        let switch = match &step.kind {
+            StepKind::Switch(to) => match self.switches.next(to).map_err(at)? {
+                // For this machine it is no step.
+                None => return Ok(()),
+                switch => switch,
+            },
+            _ => None,
+        };
+        if !matches!(&step.kind, StepKind::Through(point) if !point.begins) {
+            self.end_spline()?;
+        }
+        let path_move = |element: Element<N>, feed: Feed, mode| {
+            let feeds = Feeds::programmed(feed.mm_s(), &element, &machine.letters_by_place());
+            move_at(line, element, feeds, mode, machine)
+        };
+        match &step.kind {
+            StepKind::Line(to) => self.go([path_move(Element::line(to, machine), to.feed, to.mode)]),
+            StepKind::Arc(arc) => {
+                let element = Element::arc(arc, machine).map_err(|error| at(error.into()))?;
+                self.go([path_move(element, arc.feed, arc.mode)]);
+            }
+            StepKind::Cubic(curve) => {
+                let element = cubic(curve, machine).map_err(at)?;
+                self.go([path_move(element, curve.feed, curve.mode)]);
+            }
+            StepKind::Nurbs(curve) => {
+                let elements = nurbs(curve, curves.get(curve.curve), machine).map_err(at)?;
+                self.go(elements.into_iter().map(|element| path_move(element, curve.feed, curve.mode)));
+            }
+            StepKind::Through(point) => {
+                let (from, to) = (machine.coordinates(point.from), machine.coordinates(point.to));
+                if self.points.is_empty() {
+                    self.start = from;
+                }
+                let chord = Element::Line { from, to };
+                let feeds = Feeds::programmed(point.feed.mm_s(), &chord, &machine.letters_by_place());
+                self.points.push(Point { line, at: to, feeds, mode: point.mode });
+                // The points of a spline are not moves yet; the stop behind the last is made above.
+                return Ok(());
+            }
+            StepKind::Probe(probe) => {
+                self.stop();
+                let ProbeMove { from, to, end, feed, .. } = *probe;
+                travel::check_end(end, machine).map_err(at)?;
+                self.parts.push(Part::Probe { line, probe: *probe });
+                if from != to {
+                    let to = LineMove { from, to, feed, mode: PathMode::ExactStop };
+                    self.go([path_move(Element::line(&to, machine), feed, to.mode)]);
+                }
+                self.stop();
+            }
+            &StepKind::Dwell { seconds } => {
+                self.stop();
+                self.rest(line, seconds);
+            }
+            StepKind::Switch(_) => {
+                self.stop();
+                if let Some((to, wait_s)) = switch {
+                    self.parts.push(Part::Switch { line, to });
+                    self.rest(line, wait_s);
+                }
+            }
+            &StepKind::ToolChange { tool } => {
+                self.stop();
+                // A message of its line names the tool, too.
+                let others = take(&mut self.said).into_iter().filter(|&(of_line, _)| of_line != line);
+                self.parts
+                    .push(Part::Stop { line, said: words(format!("changes to tool {tool}"), line, others) });
+            }
+            StepKind::Stop => {
+                self.stop();
+                let said = words("stops".to_owned(), line, take(&mut self.said).into_iter());
+                self.parts.push(Part::Stop { line, said });
+            }
+            StepKind::End => self.stop(),
+        }
+        if step.kind.mode() == Some(PathMode::ExactStop) {
+            self.stop();
+        }
+        Ok(())
+    }
+
+    /// Makes moves of the points of a spline.
+    pub(super) fn end_spline(&mut self) -> AtLine<()> {
+        let stops = self.points.last().is_some_and(|point| point.mode == PathMode::ExactStop);
+        let moves = through(self.start, &mut self.points, self.machine)?;
+        self.go(moves);
+        if stops {
+            self.stop();
+        }
+        Ok(())
+    }
+
+    /// Takes moves.
+    pub(super) fn go(&mut self, moves: impl IntoIterator<Item = Move<N>>) {
+        for step in moves {
+            self.run.push(step);
+            if self.run.len() > self.section {
+                self.cut();
+            }
+        }
+    }
+
+    /// Cuts a section off the run. A move at least is left.
+    fn cut(&mut self) {
+        let length_mm = |step: &Move<N>| match step.element {
+            Element::Line { .. } | Element::Arc { .. } => step.element.length_mm(),
+            Element::Polynomial { .. } | Element::Involute { .. } => 0.0,
+        };
+        let later = self.section / 2..self.section;
+        let longest = later.max_by(|&one, &other| {
+            length_mm(&self.run[one]).total_cmp(&length_mm(&self.run[other])).then(other.cmp(&one))
+        });
+        let Some(longest) = longest.filter(|&index| length_mm(&self.run[index]) > 0.0) else {
+            let rest = self.run.split_off(self.section);
+            return self.end_section(rest);
+        };
+        let mut rest = self.run.split_off(longest);
+        let [first_half, other_half] = rest[0].element.split(0.5);
+        self.run.push(Move { element: first_half, ..rest[0] });
+        rest[0].element = other_half;
+        self.end_section(rest);
+    }
+
+    fn end_section(&mut self, rest: Vec<Move<N>>) {
+        let moves = std::mem::replace(&mut self.run, rest);
+        self.parts.push(Part::Moves { moves, goes_on: true });
+        self.section = (2 * self.section).min(SECTION[1]);
+    }
+
+    /// The motion stops here.
+    pub(super) fn stop(&mut self) {
+        if !self.run.is_empty() {
+            self.parts.push(Part::Moves { moves: take(&mut self.run), goes_on: false });
+        }
+    }
+
+    /// A dwell; one of no time changes nothing but the stop it makes.
+    fn rest(&mut self, line: u32, seconds: f64) {
+        if seconds > 0.0 {
+            self.parts.push(Part::Dwell { line, seconds });
+        }
+    }
+}
+
+/// What is said of a stop.
+fn words(what: String, line: u32, said: impl Iterator<Item = (u32, String)>) -> String {
+    said.fold(format!("line {line} {what}"), |words, (_, text)| format!("{words}; {text}"))
+}
+
+/// A move of a program's line, with the tolerances of its path mode.
+pub(super) fn move_at<const N: usize>(
+    line: u32,
+    element: Element<N>,
+    feeds: Feeds,
+    mode: PathMode,
+    machine: &Machine<N>,
+) -> Move<N> {
+    let merging_mm = match mode {
+        PathMode::Blend { merging_mm, .. } => merging_mm,
+        PathMode::Unprogrammed | PathMode::ExactPath | PathMode::ExactStop => None,
+    };
+    Move { line, element, feeds, tolerance_mm: machine.path.tolerance_mm(mode), merging_mm }
+}

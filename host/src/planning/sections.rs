@@ -1,0 +1,70 @@
+//! Parts of a program, smoothed: several at once.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
+use super::blending::blocks;
+use super::error::Problem;
+use super::runs::Part;
+use super::stretch::StretchBlock;
+use crate::machine::Machine;
+
+/// A part with its moves smoothed.
+#[derive(Clone, Debug)]
+pub(super) enum Smoothed<const N: usize> {
+    /// Blocks; the junction feed of the last one is 0.
+    Blocks {
+        /// The blocks.
+        blocks: Vec<StretchBlock<N>>,
+        /// The next part goes on without a stop.
+        goes_on: bool,
+    },
+    /// What has no moves.
+    Other(Part<N>),
+}
+
+/// Moves that are worth a thread.
+const MOVES_MIN: usize = 32;
+
+/// Parts that are smoothed together at most: what waits meanwhile is bounded.
+pub(super) const TOGETHER: usize = 16;
+
+/// Smooths parts, in their order. An error comes with the program line; it ends the parts.
+pub(super) fn smoothed<const N: usize>(
+    parts: Vec<Part<N>>,
+    machine: &Machine<N>,
+) -> Vec<Result<Smoothed<N>, (u32, Problem)>> {
+    let is_long = |part: &Part<N>| matches!(part, Part::Moves { moves, .. } if moves.len() >= MOVES_MIN);
+    let long = parts.iter().filter(|part| is_long(part)).count();
+    let threads = thread::available_parallelism().map_or(1, usize::from).min(long);
+    if threads < 2 {
+        return parts.into_iter().map(|part| one(part, machine)).collect();
+    }
+    let next = AtomicUsize::new(0);
+    let places: Vec<_> = parts.into_iter().map(|part| Mutex::new((Some(part), None))).collect();
+    let work = || {
+        // Who takes a number takes the part; nobody waits for a place.
+        while let Some(place) = places.get(next.fetch_add(1, Ordering::Relaxed)) {
+            if let Ok(mut place) = place.lock() {
+                place.1 = place.0.take().map(|part| one(part, machine));
+            }
+        }
+    };
+    thread::scope(|scope| {
+        (1..threads).for_each(|_| {
+            scope.spawn(work);
+        });
+        work();
+    });
+    places.into_iter().filter_map(|place| place.into_inner().ok()?.1).collect()
+}
+
+fn one<const N: usize>(part: Part<N>, machine: &Machine<N>) -> Result<Smoothed<N>, (u32, Problem)> {
+    match part {
+        Part::Moves { moves, goes_on } => {
+            blocks(&moves, machine).map(|blocks| Smoothed::Blocks { blocks, goes_on })
+        }
+        other => Ok(Smoothed::Other(other)),
+    }
+}
