@@ -16,11 +16,15 @@ use super::travel;
 use crate::gcode::{Feed, LineMove, Message, Nurbs, PathMode, ProbeMove, Step, StepKind};
 use crate::machine::Machine;
 use crate::toolpath::smooth::Move;
-use crate::toolpath::{Element, Feeds, Vector};
+use crate::toolpath::{Element, Feeds, SpeedRatios, Vector};
 
-/// Moves of the first section of a program, and of the longest one: each is twice as long as the one before, so that
-/// motion begins soon.
+/// Moves of the first section of a program at least, and of the later ones: each has twice as many as the one before, so
+/// that motion begins soon.
 const SECTION: [usize; 2] = [64, 1024];
+/// A section takes this time at the programmed feed \[s\] at least, since a cut may cost some: 0.02 to 0.2 s were seen.
+const SECTION_S: f64 = 4.0;
+/// Moves of a section at most.
+const SECTION_MAX: usize = 1 << 14;
 
 /// A part of a program for a machine.
 #[derive(Clone, Debug)]
@@ -51,6 +55,8 @@ pub(super) struct Runs<'m, const N: usize> {
     machine: &'m Machine<N>,
     switches: Switches<'m, N>,
     run: Vec<Move<N>>,
+    /// Its time at the programmed feed \[s\].
+    run_s: f64,
     /// Where the spline begins whose points are being collected, and these.
     start: Vector<N>,
     points: Vec<Point<N>>,
@@ -71,6 +77,7 @@ impl<'m, const N: usize> Runs<'m, N> {
             machine,
             switches: Switches::new(machine),
             run: Vec::new(),
+            run_s: 0.0,
             start: [0.0; N],
             points: Vec::new(),
             section: SECTION[0],
@@ -194,11 +201,19 @@ impl<'m, const N: usize> Runs<'m, N> {
     /// Takes moves.
     pub(super) fn go(&mut self, moves: impl IntoIterator<Item = Move<N>>) {
         for step in moves {
+            self.run_s += self.time_s(&step);
             self.run.push(step);
-            if self.run.len() > self.section {
+            let is_long = self.run.len() > self.section && self.run_s > SECTION_S;
+            if is_long || self.run.len() > SECTION_MAX {
                 self.cut();
             }
         }
+    }
+
+    /// The time of a move at its programmed feed \[s\].
+    fn time_s(&self, step: &Move<N>) -> f64 {
+        let ratios = SpeedRatios::of(&step.element, &self.machine.letters_by_place());
+        step.element.length_mm() / step.feeds.along(&ratios).min(self.machine.path.feed_mm_s)
     }
 
     /// Cuts a section off the run. A move at least is left.
@@ -207,22 +222,25 @@ impl<'m, const N: usize> Runs<'m, N> {
             Element::Line { .. } | Element::Arc { .. } => step.element.length_mm(),
             Element::Polynomial { .. } | Element::Involute { .. } => 0.0,
         };
-        let later = self.section / 2..self.section;
-        let longest = later.max_by(|&one, &other| {
-            length_mm(&self.run[one]).total_cmp(&length_mm(&self.run[other])).then(other.cmp(&one))
-        });
-        let Some(longest) = longest.filter(|&index| length_mm(&self.run[index]) > 0.0) else {
-            let rest = self.run.split_off(self.section);
-            return self.end_section(rest);
+        let last = self.run.len() - 1;
+        let later = self.run.iter().enumerate().take(last).skip(last / 2);
+        let longest = later.map(|(index, step)| (index, length_mm(step))).rev();
+        let longest = longest.max_by(|(_, one), (_, other)| one.total_cmp(other));
+        let rest = match longest {
+            Some((index, length_mm)) if length_mm > 0.0 => {
+                let mut rest = self.run.split_off(index);
+                let [first_half, other_half] = rest[0].element.split(0.5);
+                self.run.push(Move { element: first_half, ..rest[0] });
+                rest[0].element = other_half;
+                rest
+            }
+            _ => self.run.split_off(last),
         };
-        let mut rest = self.run.split_off(longest);
-        let [first_half, other_half] = rest[0].element.split(0.5);
-        self.run.push(Move { element: first_half, ..rest[0] });
-        rest[0].element = other_half;
         self.end_section(rest);
     }
 
     fn end_section(&mut self, rest: Vec<Move<N>>) {
+        self.run_s = rest.iter().map(|step| self.time_s(step)).sum();
         let moves = std::mem::replace(&mut self.run, rest);
         self.parts.push(Part::Moves { moves, goes_on: true });
         self.section = (2 * self.section).min(SECTION[1]);
@@ -232,6 +250,7 @@ impl<'m, const N: usize> Runs<'m, N> {
     pub(super) fn stop(&mut self) {
         if !self.run.is_empty() {
             self.parts.push(Part::Moves { moves: take(&mut self.run), goes_on: false });
+            self.run_s = 0.0;
         }
     }
 
