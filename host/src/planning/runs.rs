@@ -3,9 +3,11 @@
 //! **Sections.** A run without a stop may be as long as the program. It is cut into sections, each of which is smoothed by
 //! itself, so that motion begins before all is planned, and in bounded memory. Where it is cut depends on the moves alone.
 //! A cut is in the middle of a straight move or an arc, the longest of the later half: nothing steps there, and blends
-//! take at most half of a move anyhow.
+//! take at most half of a move anyhow. Where moves are short, one stands for several, so that its direction is that of the
+//! path.
 
 use std::mem::take;
+use std::ops::Range;
 
 use motion_kernel::hal::OutputState;
 
@@ -15,7 +17,8 @@ use super::outputs::Switches;
 use super::travel;
 use crate::gcode::{Feed, LineMove, Message, Nurbs, PathMode, ProbeMove, Step, StepKind};
 use crate::machine::Machine;
-use crate::toolpath::smooth::Move;
+use crate::toolpath::merge::merge;
+use crate::toolpath::smooth::{Move, is_same_run};
 use crate::toolpath::{Element, Feeds, SpeedRatios, Vector};
 
 /// Moves of the first section of a program at least, and of the later ones: each has twice as many as the one before, so
@@ -23,6 +26,12 @@ use crate::toolpath::{Element, Feeds, SpeedRatios, Vector};
 const SECTION: [usize; 2] = [64, 1024];
 /// A section takes this time at the programmed feed \[s\] at least, since a cut may cost some: 0.02 to 0.2 s were seen.
 const SECTION_S: f64 = 4.0;
+/// The tolerance of the halves, as a part of the move's: lines of another tolerance are not merged with them, so that both
+/// go on in one direction.
+const HALF: f64 = 1.0 - 1.0e-6;
+/// So many moves on either side of a cut may become one with the move that is cut, within this part of their tolerance.
+const AROUND: usize = 32;
+const AROUND_SHARE: f64 = 0.5;
 /// Moves of a section at most.
 const SECTION_MAX: usize = 1 << 14;
 
@@ -226,17 +235,46 @@ impl<'m, const N: usize> Runs<'m, N> {
         let later = self.run.iter().enumerate().take(last).skip(last / 2);
         let longest = later.map(|(index, step)| (index, length_mm(step))).rev();
         let longest = longest.max_by(|(_, one), (_, other)| one.total_cmp(other));
-        let rest = match longest {
-            Some((index, length_mm)) if length_mm > 0.0 => {
-                let mut rest = self.run.split_off(index);
-                let [first_half, other_half] = rest[0].element.split(0.5);
-                self.run.push(Move { element: first_half, ..rest[0] });
-                rest[0].element = other_half;
-                rest
-            }
-            _ => self.run.split_off(last),
+        let Some((index, _)) = longest.filter(|&(_, length_mm)| length_mm > 0.0) else {
+            let rest = self.run.split_off(last);
+            return self.end_section(rest);
         };
+        let (whole, stands_for) = self.around(index, last);
+        let [first_half, other_half] = whole.element.split(0.5);
+        let mut rest = self.run.split_off(stands_for.end);
+        rest.insert(0, Move { element: other_half, ..whole });
+        self.run.truncate(stands_for.start);
+        self.run.push(Move { element: first_half, ..whole });
         self.end_section(rest);
+    }
+
+    /// One line or arc for the short lines around a move, if there is one within a part of their tolerance, and the moves that
+    /// it stands for; these have to end before `last`. It is longer than the move, and its direction is that of the path.
+    fn around(&self, index: usize, last: usize) -> (Move<N>, Range<usize>) {
+        let alike = |one: usize| is_same_run(&self.run[one], &self.run[one + 1]);
+        let first = (index.saturating_sub(AROUND)..index).rev().take_while(|&before| alike(before)).last();
+        let end = (index..(index + AROUND).min(last - 1)).take_while(|&here| alike(here)).last();
+        let (first, end) = (first.unwrap_or(index), end.map_or(index, |here| here + 1) + 1);
+        let step = self.run[index];
+        let moves = &self.run[first..end];
+        let from = moves.iter().map(|step| step.element.ends_mm().0);
+        let points: Vec<_> = from.chain(moves.last().map(|step| step.element.ends_mm().1)).collect();
+        let parts =
+            if moves.len() > 1 { merge(&points, AROUND_SHARE * step.tolerance_mm) } else { Vec::new() };
+        let ends = parts.iter().skip(1).map(|part| part.first).chain([moves.len()]);
+        let longest = parts
+            .iter()
+            .zip(ends)
+            .max_by(|(one, _), (other, _)| one.element.length_mm().total_cmp(&other.element.length_mm()));
+        let (element, distance_mm, stands_for) = match longest {
+            Some((part, end)) if part.element.length_mm() > step.element.length_mm() => {
+                (part.element, part.distance_mm, first + part.first..first + end)
+            }
+            _ => (step.element, 0.0, index..index + 1),
+        };
+        let feeds = self.run[stands_for.clone()].iter().map(|step| step.feeds).reduce(Feeds::least);
+        let tolerance_mm = (step.tolerance_mm - distance_mm) * HALF;
+        (Move { element, tolerance_mm, feeds: feeds.unwrap_or(step.feeds), ..step }, stands_for)
     }
 
     fn end_section(&mut self, rest: Vec<Move<N>>) {

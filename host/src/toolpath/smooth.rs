@@ -256,7 +256,7 @@ fn straightened<const N: usize>(
 
 /// Whether two moves may become one: lines with one feed and one tolerance. What becomes of them is driven at the feed of
 /// its own direction.
-fn is_same_run<const N: usize>(before: &Move<N>, after: &Move<N>) -> bool {
+pub(crate) fn is_same_run<const N: usize>(before: &Move<N>, after: &Move<N>) -> bool {
     let is_line = |step: &Move<N>| matches!(step.element, Element::Line { .. });
     is_line(before)
         && is_line(after)

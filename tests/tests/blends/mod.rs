@@ -7,13 +7,14 @@
 //! - `asked`: programmed moves, at random too, and what they mean;
 //! - `compiled`: the pieces of a plan, held against them;
 //! - `driven`: the executed ticks, held against the limits;
-//! - `tolerance`, `limits`, `time`, `modes`: the tests.
+//! - `tolerance`, `limits`, `time`, `modes`, `sections`: the tests.
 
 mod asked;
 mod compiled;
 mod driven;
 mod limits;
 mod modes;
+mod sections;
 mod time;
 mod tolerance;
 
