@@ -214,7 +214,7 @@ fn path_blocks<const N: usize>(stretch: &Stretch<N>, ends: &[Position], dense: &
 }
 
 /// Blocks and both streams as one, in the order of the path positions where the items start.
-fn in_order_of_start<const N: usize>(
+pub(super) fn in_order_of_start<const N: usize>(
     blocks: &[Placed<N>],
     pieces: &[Placed<N>],
     feed: &[Placed<N>],

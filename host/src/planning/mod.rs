@@ -20,6 +20,7 @@
 //! - [`profile`]: feed and time at any path position of a planned stretch;
 //! - [`blocks`]: bare block lists, BLOCKS.json;
 //! - [`executable`]: a plan in the kernel's terms;
+//! - `rest`: the rest of a stretch, from one of its pieces on;
 //! - `compiled`: a plan as bytes for a board;
 //! - `density`: refuses what is too dense for a tick;
 //! - [`error`]: refusals, with file and line.
@@ -36,6 +37,7 @@ mod lookahead;
 pub mod outputs;
 pub mod profile;
 pub mod program;
+mod rest;
 pub mod spline;
 pub mod stretch;
 mod travel;
@@ -47,6 +49,7 @@ pub use executable::Executable;
 pub use outputs::require_outputs;
 pub use profile::PlacedRamp;
 pub use program::{plan_moves, plan_program};
+pub(crate) use rest::rest_of_stretch;
 pub use spline::plan_spline;
 pub use stretch::Stretch;
 

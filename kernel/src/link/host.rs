@@ -243,6 +243,15 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         self.is_unreadable = false;
     }
 
+    /// The number of the board's start, once it has answered.
+    #[must_use]
+    pub const fn session(&self) -> Option<u32> {
+        match self.session {
+            Session::Greeted(session) | Session::Ready(session) => Some(session),
+            Session::Unknown | Session::Lost(_) | Session::Replaced => None,
+        }
+    }
+
     /// Whether the board has confirmed the controls.
     #[must_use]
     pub const fn is_controlled(&self) -> bool {
@@ -536,7 +545,8 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             return 0;
         }
         let (asker, aborts, first) = (self.asker, self.controls.aborts, self.next);
-        let Some(mut payload) = Payload::of(&Request::Items { session, asker, aborts, first, is_last }) else {
+        let Some(mut payload) = Payload::of(&Request::Items { session, asker, aborts, first, is_last })
+        else {
             return 0;
         };
         if !payload.push_all(self.bytes.iter().copied().skip(skipped).take(length)) {
