@@ -12,7 +12,7 @@ const PANIC: [&str; 5] = ["panic", "unwrap_failed", "expect_failed", "slice_inde
 
 /// Flash of the kernel, RAM of 3 axes with 64 pieces and 64 segments, and stack of the tick that are promised on
 /// the M4F [bytes].
-const FLASH_MAX: u64 = 36 << 10;
+const FLASH_MAX: u64 = 42 << 10;
 const STACK_MAX: u64 = 1 << 10;
 
 fn file(tools: &Tools, board: Board, name: &str) -> Result<Vec<u8>, String> {

@@ -361,6 +361,8 @@ fn driven(tools: &Tools, board: Board) -> Result<String, String> {
     if !is_same || next <= BEFORE || next as usize >= entries.len() || at_rest.taken > next {
         return Err(format!("after the cable: item {next} of {}, {controls:?}, {at_rest:?}", entries.len()));
     }
+    // The bytes of an item depend on those before it.
+    entries.iter().take(next as usize).flatten().for_each(|item| pc.host.skip(item));
     pc.send(&entries[next as usize..]);
     pc.press(Mode::Run)?;
     pc.end()?;
