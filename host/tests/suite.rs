@@ -14,12 +14,14 @@ mod curves;
 mod cutter;
 mod dialect;
 mod drive;
+mod from_line;
 mod gcode;
 mod limit_share;
 mod mutation;
 mod nurbs;
 mod probing;
 mod outputs;
+mod resume;
 mod smoothness;
 mod spline;
 

@@ -276,6 +276,8 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
         }
         self.status_ms = now_ms;
         let (live, starvations) = (self.streamed.state(), self.streamed.starvations());
+        // Before the position: a piece that is driven meanwhile is told as the one under way.
+        let driven = self.streamed.driven();
         let status = control.lock(|control| {
             let (trace, is_off) = (control.kernel.trace(), control.kernel.is_off());
             Status {
@@ -289,6 +291,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
                 // What has come is known where it is written.
                 aborts: 0,
                 taken: 0,
+                driven,
                 is_ended: false,
                 starvations,
                 is_ready: control.is_healthy(),
@@ -478,6 +481,78 @@ mod tests {
         assert_eq!(names(&seen), [State::Off, State::Held, State::Moving, State::Idle]);
         assert_eq!(seen.states.last().map(|(_, set)| *set), Some(end()));
         assert!(seen.drives.is_enabled);
+    }
+
+    /// What is told to be driven is where motion is: on the piece after it, in every status; and the next program counts anew.
+    #[test]
+    fn pieces_are_counted_as_they_are_driven() {
+        let (mut step, mut path, mut last, mut seen) = (0, Vec::new(), 0, 0);
+        board(|now, operator| {
+            let before = step;
+            let is_over = drive(&mut step, operator);
+            if (before, step) == (1, 2) {
+                let items = stringer(operator.status.expect("held").set);
+                path = items
+                    .into_iter()
+                    .filter_map(|item| match item? {
+                        Item::Line { start, length, .. } | Item::Septic { start, length, .. } => {
+                            Some((start, length))
+                        }
+                        Item::EndOfStretch(end) => Some((end, Position::ZERO)),
+                        _ => None,
+                    })
+                    .collect();
+            }
+            let Some(status) =
+                operator.status.filter(|status| status.aborts == operator.host.controls().aborts)
+            else {
+                return is_over;
+            };
+            assert!(status.driven >= last, "tick {now}: {} after {last}", status.driven);
+            last = status.driven;
+            if step == 2
+                && let Some((start, length)) = path.get(last as usize)
+            {
+                let squares =
+                    status.set.iter().zip(start).map(|(set, start)| (*set - *start).to_mm().powi(2));
+                let from_start_mm = squares.sum::<f64>().sqrt();
+                assert!(
+                    from_start_mm <= length.to_mm() + 1e-4,
+                    "tick {now}: {from_start_mm} mm of {length:?}"
+                );
+                seen = seen.max(last);
+            }
+            is_over
+        });
+        assert_eq!(last as usize, path.len());
+        assert!(seen > 10 && path.len() >= 15, "{seen} of {}", path.len());
+    }
+
+    /// After an abort nothing of the program before counts for the next one.
+    #[test]
+    fn after_an_abort_the_count_begins_anew() {
+        let mut step = 0;
+        let mut counts = Vec::new();
+        board(|now, operator| {
+            if now < 2500 {
+                drive(&mut step, operator);
+            } else if now == 2500 {
+                counts.push(operator.status.expect("told").driven);
+                assert!(operator.host.abort());
+                operator.items.clear();
+            }
+            if let Some(status) = operator
+                .status
+                .filter(|status| now > 2500 && status.aborts == operator.host.controls().aborts)
+            {
+                counts.push(status.driven);
+            }
+            now == 5000
+        });
+        assert!(
+            counts[0] > 0 && counts.len() > 100 && counts[1..].iter().all(|count| *count == 0),
+            "{counts:?}"
+        );
     }
 
     /// Off before the operator's command, whatever else was pressed.

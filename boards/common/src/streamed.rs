@@ -161,6 +161,12 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         }
     }
 
+    /// How many pieces of path and ends of stretches of the program are driven; see [`LiveControl::driven`].
+    #[must_use]
+    pub fn driven(&self) -> u32 {
+        self.control.driven(&self.feeder)
+    }
+
     /// Number of stops on the path because items came too late.
     #[must_use]
     pub fn starvations(&self) -> u32 {
@@ -314,6 +320,7 @@ mod tests {
                 line: 0,
                 aborts: came.aborts,
                 taken: came.taken,
+                driven: 0,
                 is_ended: came.is_ended,
                 starvations: 0,
                 is_ready: true,

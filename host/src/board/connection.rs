@@ -174,6 +174,12 @@ impl<const N: usize> Connection<N> {
         self.identity.as_ref()
     }
 
+    /// The number of its start, once it has answered: after another start it is another one.
+    #[must_use]
+    pub fn session(&self) -> Option<u32> {
+        self.link.session()
+    }
+
     /// What it told last, if that is of the program under way.
     #[must_use]
     pub fn status(&self) -> Option<&Status<N>> {

@@ -82,8 +82,10 @@ pub struct Sender<'a, const M: usize> {
     since: Instant,
     /// The operator has held: nothing here starts motion.
     is_held: bool,
+    /// The way to the job's start, with what is switched before it. It is a program of its own, or the beginning of the job's
+    /// where that has switched something: between two programs all is off.
     way: Vec<Item<M>>,
-    /// Items pushed of the way or the job, the end of it among them.
+    /// Items pushed of the program under way, its end among them.
     pushed: usize,
 }
 
@@ -154,35 +156,17 @@ impl<'a, const M: usize> Sender<'a, M> {
         };
         match *event {
             Event::Replaced => Err(BoardError::Replaced),
-            Event::Welcome(identity) => self.check(&identity),
-            Event::Refused(identity) => self.check(&identity).and(Err(BoardError::Silent)),
+            Event::Welcome(identity) => check(self.job, &identity),
+            Event::Refused(identity) => check(self.job, &identity).and(Err(BoardError::Silent)),
             Event::Restarted { confirmed } => {
-                let of_program = if self.step == Step::Drives { confirmed } else { 0 };
-                Err(BoardError::Reset { confirmed: of_program, at: self.line_at(of_program) })
+                let of_program =
+                    if self.step == Step::Drives { self.of_job(confirmed).unwrap_or(0) } else { 0 };
+                Err(BoardError::Reset { confirmed: of_program, at: self.line_at(confirmed) })
             }
             Event::Unreadable { item } => Err(BoardError::Item { at: self.line_at(item) }),
             Event::Ready { .. } | Event::Status(_) | Event::Parameters { .. } | Event::Written { .. } => {
                 Ok(())
             }
-        }
-    }
-
-    /// Whether the board is one for the job.
-    ///
-    /// # Errors
-    /// In what it is not.
-    pub fn check(&self, identity: &Identity) -> Result<(), BoardError> {
-        let job = self.job;
-        let pairs = [
-            (Agreement::Protocol, identity.protocol.to_string(), PROTOCOL.to_string()),
-            (Agreement::Format, identity.format.to_string(), FORMAT.to_string()),
-            (Agreement::Axes, identity.axes.to_string(), M.to_string()),
-            (Agreement::Tick, identity.tick_s.to_string(), job.header.tick_s.to_string()),
-            (Agreement::Machine, format!("{:08x}", identity.machine), format!("{:08x}", job.machine)),
-        ];
-        match pairs.into_iter().find(|(_, found, expected)| found != expected) {
-            Some((what, found, expected)) => Err(BoardError::Disagrees { what, found, expected }),
-            None => Ok(()),
         }
     }
 
@@ -255,7 +239,10 @@ impl<'a, const M: usize> Sender<'a, M> {
         let is_mine = program == self.job.name && next > 0;
         let is_finished = status.state == State::Idle && status.taken == next && status.is_ended;
         match self.may.found {
-            Found::Continued if !is_mine => return Err(BoardError::NotBegun),
+            // With a way of its own it has other items than were sent.
+            Found::Continued if !is_mine || !self.job.begin.lead.is_empty() => {
+                return Err(BoardError::NotBegun);
+            }
             Found::Continued if status.fault.is_some() => {
                 return Err(BoardError::Interrupted { why: "a fault" });
             }
@@ -300,8 +287,9 @@ impl<'a, const M: usize> Sender<'a, M> {
     fn approach(&mut self, status: &Status<M>, connection: &mut Connection<M>) -> Result<(), BoardError> {
         let way: Straight<M> =
             motion_board::runs::to_start(&self.job.header, status.set).map_err(BoardError::NoWay)?;
-        self.way = way.map(|item| item.unwrap_or_else(|never| match never {})).collect();
-        if self.way.is_empty() {
+        self.way = self.job.begin.lead.clone();
+        self.way.extend(way.map(|item| item.unwrap_or_else(|never| match never {})));
+        if self.way.is_empty() || !self.job.begin.lead.is_empty() {
             self.begin(connection);
             return Ok(());
         }
@@ -311,7 +299,7 @@ impl<'a, const M: usize> Sender<'a, M> {
         Ok(())
     }
 
-    /// Begins the program, at its start.
+    /// Begins the job's program.
     fn begin(&mut self, connection: &mut Connection<M>) {
         self.pushed = 0;
         let _ = connection.command(|link| link.begin(self.job.name));
@@ -319,21 +307,37 @@ impl<'a, const M: usize> Sender<'a, M> {
         self.go(Step::Drives);
     }
 
+    /// How many pieces of path and ends of stretches of the whole program are driven to their end; none before the program.
+    #[must_use]
+    pub fn driven(&self, status: &Status<M>) -> Option<u32> {
+        if !matches!(self.step, Step::Drives | Step::Disables | Step::Done) {
+            return None;
+        }
+        let is_path =
+            |item: &&Item<M>| matches!(item, Item::Line { .. } | Item::Septic { .. } | Item::EndOfStretch(_));
+        let of_way = self.way.iter().filter(is_path).count() as u32;
+        Some(self.job.begin.path + status.driven.saturating_sub(of_way))
+    }
+
     /// Pushes items, and sees whether all are driven.
     fn drive(&mut self, status: &Status<M>, connection: &mut Connection<M>) -> Result<(), BoardError> {
-        let items = if self.step == Step::ToStart { &self.way } else { &self.job.items };
+        let of_job: &[Item<M>] = if self.step == Step::ToStart { &[] } else { &self.job.items };
         match status.state {
             State::Off => return Err(BoardError::SwitchedOff),
             State::Refused => return Err(BoardError::Item { at: self.line_at(status.taken) }),
             _ => {}
         }
-        while self.pushed <= items.len()
-            && connection.push(items.get(self.pushed)).map_err(BoardError::Push)?
-        {
+        let (ahead, count) = (self.way.len(), self.way.len() + of_job.len());
+        while self.pushed <= count {
+            let item = self.way.get(self.pushed).or_else(|| of_job.get(self.pushed.checked_sub(ahead)?));
+            if !connection.push(item).map_err(BoardError::Push)? {
+                break;
+            }
             self.pushed += 1;
         }
-        if self.pushed > items.len() && connection.is_driven() {
+        if self.pushed > count && connection.is_driven() {
             if self.step == Step::ToStart {
+                self.way.clear();
                 self.begin(connection);
             } else {
                 self.end(connection);
@@ -357,9 +361,33 @@ impl<'a, const M: usize> Sender<'a, M> {
         BoardError::Fault { tick: fault.tick, told: faults::told(&fault.kind, name) }
     }
 
-    /// The program line of an item, in words.
+    /// The number in the job of an item of the program under way; none of an item of the way.
+    fn of_job(&self, item: u32) -> Option<u32> {
+        item.checked_sub(self.way.len() as u32)
+    }
+
+    /// The program line of an item of the program under way, in words.
     fn line_at(&self, item: u32) -> String {
-        self.job.line_of(item).map_or_else(String::new, |line| format!(", at line {line} of the program"))
+        let line = self.of_job(item).and_then(|item| self.job.line_of(item));
+        line.map_or_else(String::new, |line| format!(", at line {line} of the program"))
+    }
+}
+
+/// Whether the board is one for the job.
+///
+/// # Errors
+/// In what it is not.
+pub fn check<const M: usize>(job: &Job<M>, identity: &Identity) -> Result<(), BoardError> {
+    let pairs = [
+        (Agreement::Protocol, identity.protocol.to_string(), PROTOCOL.to_string()),
+        (Agreement::Format, identity.format.to_string(), FORMAT.to_string()),
+        (Agreement::Axes, identity.axes.to_string(), M.to_string()),
+        (Agreement::Tick, identity.tick_s.to_string(), job.header.tick_s.to_string()),
+        (Agreement::Machine, format!("{:08x}", identity.machine), format!("{:08x}", job.machine)),
+    ];
+    match pairs.into_iter().find(|(_, found, expected)| found != expected) {
+        Some((what, found, expected)) => Err(BoardError::Disagrees { what, found, expected }),
+        None => Ok(()),
     }
 }
 
@@ -373,7 +401,7 @@ pub fn check_outputs<const M: usize>(
     has: BoardOutputs,
 ) -> Result<(), BoardError> {
     let mut speed_rpm = None;
-    for (number, item) in (0..).zip(&job.items) {
+    for (number, item) in (0_u32..).zip(job.begin.lead.iter().chain(&job.items)) {
         let Item::Switch(to) = item else { continue };
         let found = match has {
             BoardOutputs::CommandedSpeed => continue,
@@ -386,6 +414,7 @@ pub fn check_outputs<const M: usize>(
             }
             BoardOutputs::FixedSpeed => continue,
         };
+        let number = number.saturating_sub(job.begin.lead.len() as u32);
         let (program, line) = (program.to_owned(), job.line_of(number).unwrap_or(0));
         return Err(BoardError::Outputs { program, line, found, has });
     }

@@ -7,6 +7,8 @@ use thiserror::Error;
 
 use crate::board::BoardError;
 use crate::board::emulated::EmulatedError;
+use crate::board::from_line::FromLineError;
+use crate::cli::send::resume::ResumeError;
 use crate::drive::DriveError;
 use crate::files::FilesError;
 use crate::flight::FlightError;
@@ -80,6 +82,30 @@ pub enum CliError {
         program: String,
         /// Its line.
         line: u32,
+    },
+    /// A program can't be begun at a line.
+    #[error("{program}:{line}: {source}")]
+    FromLine {
+        /// The program.
+        program: String,
+        /// The line asked for.
+        line: u32,
+        /// Why not.
+        source: FromLineError,
+    },
+    /// The file is no journal of a program under way.
+    #[error("{path}: found no journal, expected one that `motion send` has written")]
+    NoJournal {
+        /// The path, as the user gave it.
+        path: String,
+    },
+    /// A journal's program can't be gone on with.
+    #[error("{path}: {source}")]
+    Resume {
+        /// The path of the journal.
+        path: String,
+        /// Why not.
+        source: ResumeError,
     },
     /// A folder can't be read.
     #[error("{path}: found {source}, expected a folder that can be read")]

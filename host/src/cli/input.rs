@@ -5,6 +5,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 use clap::{ArgAction, Args};
+use serde::{Deserialize, Serialize};
 
 use super::error::CliError;
 use crate::files::STANDARD_INPUT;
@@ -12,7 +13,7 @@ use crate::gcode::{self, Axis, GcodeError, ParameterFile, Program, ReadOptions, 
 use crate::machine::{AnyMachine, Machine};
 
 /// What G-code is read with.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, PartialEq, Args, Serialize, Deserialize)]
 pub(super) struct ReadingArguments {
     /// Leave out lines of G-code that begin with `/`.
     #[arg(long, value_name = "true|false", default_value_t = true, action = ArgAction::Set)]
@@ -64,6 +65,16 @@ impl ReadingArguments {
             lines_max: self.lines_max,
             ..machine
         })
+    }
+
+    /// The same with other paths.
+    pub(super) fn with_paths(&self, path: impl Fn(&Path) -> PathBuf) -> Self {
+        Self {
+            subroutines: self.subroutines.iter().map(|folder| path(folder)).collect(),
+            parameters: self.parameters.as_deref().map(&path),
+            tools: self.tools.as_deref().map(&path),
+            ..self.clone()
+        }
     }
 
     /// The program of a source, with the options of a machine.

@@ -31,6 +31,7 @@
 //! - [`drive`]: experiments with the drives: step, harmonic motion, circles;
 //! - [`compile`]: a program as bytes, for a board;
 //! - [`send`]: a program on a board, over a wire;
+//! - [`send::resume`]: a program after a power cut;
 //! - [`watch`]: what a board does;
 //! - [`parameters`]: a board's parameters;
 //! - [`board`]: a board with the simulated machine;
@@ -94,6 +95,9 @@ Examples:
   motion drive circle --report circle.html       the axes' circle test, with its pictures
   motion compile part.ngc -o part.bin            the plan as bytes, for a board
   motion send part.ngc --port /dev/ttyACM0       a program on a board, over a wire
+  motion send part.ngc --port /dev/ttyACM0 --from-line 120
+                                                 from the path of line 120 on
+  motion resume --port /dev/ttyACM0              goes on after a power cut
   motion watch --port /dev/ttyACM0               what the board does
   motion parameters diff --port /dev/ttyACM0 --machine mine.toml
                                                  what the board and the file have not in common
@@ -138,6 +142,7 @@ enum Command {
     Drive(drive::DriveArguments),
     Compile(compile::CompileArguments),
     Send(send::SendArguments),
+    Resume(send::resume::ResumeArguments),
     Watch(watch::WatchArguments),
     Parameters(parameters::ParametersArguments),
     Board(board::BoardArguments),
@@ -180,6 +185,7 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
         Some(Command::Drive(arguments)) => drive::drive(arguments, out),
         Some(Command::Compile(arguments)) => compile::compile(arguments, out),
         Some(Command::Send(arguments)) => send::send(arguments, out),
+        Some(Command::Resume(arguments)) => send::resume::resume(arguments, out),
         Some(Command::Watch(arguments)) => watch::watch(arguments, out),
         Some(Command::Parameters(arguments)) => parameters::run(arguments, out),
         Some(Command::Board(arguments)) => board::run(arguments, out),

@@ -11,7 +11,7 @@ use crate::board::{BoardError, Connection, Port};
 use crate::machine::Machine;
 
 /// Where the board is.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(super) struct PortArguments {
     /// Where the board is: `tcp:HOST:PORT`, a serial port such as `/dev/ttyACM0` or `COM3`, or `simulator` for the
     /// simulated machine in this process.

@@ -215,6 +215,11 @@ impl Interpreter {
     /// The tool is in the spindle; 0: none is.
     fn take_tool(&mut self, number: u32) {
         self.tools.current = number;
+        let (step, changes) = (self.program.steps.len(), &mut self.program.tool_changes);
+        match changes.last_mut() {
+            Some((before, tool)) if *before == step => *tool = number,
+            _ => changes.push((step, number)),
+        }
         let tools = &mut self.program.tools;
         if number != 0 && !tools.contains(&number) {
             tools.push(number);

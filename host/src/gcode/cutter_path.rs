@@ -381,6 +381,12 @@ impl Interpreter {
                 continue;
             }
             self.program.steps.remove(index);
+            self.program.lines.removed(index);
+            for (before, _) in
+                self.program.tool_changes.iter_mut().rev().take_while(|(before, _)| *before > index)
+            {
+                *before -= 1;
+            }
             for message in self.program.messages.iter_mut().rev().take_while(|message| message.step > index) {
                 message.step -= 1;
             }

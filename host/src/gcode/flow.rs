@@ -91,6 +91,14 @@ impl<'a> Flow<'a> {
             return Err(file.failure(last, Located::new(0, Problem::SubprogramWithoutEnd)));
         };
         self.place = after;
+        // What follows the last line's end is no line.
+        if self.file == 0 && !file.source.is_end(here) {
+            let program = &mut self.interpreter.program;
+            program.lines.is_there(here.line);
+            if !self.interpreter.ended {
+                program.lines.run(here.line, program.steps.len());
+            }
+        }
         if is_blank_line(line) {
             // In a loop they take time, too.
             self.executed += 1;

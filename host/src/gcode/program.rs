@@ -1,6 +1,7 @@
 //! The steps of a program, in its order.
 
 use super::axis::{Axes, Point};
+use super::lines::Lines;
 use super::parameters::Parameters;
 use motion_kernel::hal::Spindle;
 use std::fmt;
@@ -22,6 +23,10 @@ pub struct Program {
     pub messages: Vec<Message>,
     /// Tools that were in the spindle, whoever changed them, in the order of their first use.
     pub tools: Vec<u32>,
+    /// Changes of the tool in the spindle: before the step of an index, and to which; 0: to none.
+    pub tool_changes: Vec<(usize, u32)>,
+    /// When its lines run.
+    pub lines: Lines,
     /// Tools that were used without a tool table: taken to have length 0, and the radius of the options.
     pub tools_assumed: Vec<u32>,
     /// That radius \[mm\].
@@ -96,6 +101,13 @@ impl Program {
             notes.push(format!("{more} more messages"));
         }
         notes
+    }
+
+    /// The tool in the spindle at a step; 0: none, or the one that was there before the program.
+    #[must_use]
+    pub fn tool_at(&self, step: usize) -> u32 {
+        let until = self.tool_changes.partition_point(|&(before, _)| before <= step);
+        until.checked_sub(1).and_then(|last| self.tool_changes.get(last)).map_or(0, |&(_, tool)| tool)
     }
 
     /// Most messages that [`Self::notes`] lists.

@@ -49,6 +49,11 @@ impl<'a> Source<'a> {
         Some((line.strip_suffix(b"\r").unwrap_or(line), after))
     }
 
+    /// Whether nothing follows a place.
+    pub(super) fn is_end(&self, place: Place) -> bool {
+        place.offset >= self.text.len()
+    }
+
     /// The start of a line's words; none for a line that is left out.
     pub(super) fn cursor<'line>(&self, line: &'line [u8], block_delete: bool) -> Option<Cursor<'line>> {
         let mut cursor = Cursor::new(line);

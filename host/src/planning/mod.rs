@@ -25,6 +25,7 @@
 //! - `items`: blocks and ramps in the kernel's terms;
 //! - [`executable`]: a whole plan in these;
 //! - [`stream`]: a program while it is read;
+//! - `rest`: the rest of a stretch, from one of its pieces on;
 //! - `compiled`: a plan as bytes for a board;
 //! - `density`: refuses what is too dense for a tick;
 //! - [`error`]: refusals, with file and line.
@@ -45,6 +46,7 @@ mod lookahead;
 pub mod outputs;
 pub mod profile;
 pub mod program;
+mod rest;
 pub mod spline;
 pub mod stream;
 pub mod stretch;
@@ -57,6 +59,7 @@ pub use executable::Executable;
 pub use outputs::require_outputs;
 pub use profile::PlacedRamp;
 pub use program::{plan_moves, plan_program};
+pub(crate) use rest::rest_of_stretch;
 pub use spline::plan_spline;
 pub use stream::{Stream, Streamed};
 pub use stretch::Stretch;

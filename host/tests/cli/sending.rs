@@ -132,3 +132,118 @@ fn a_program_stop_where_nobody_is() {
         assert!(status != Some(0) && error.contains(expected), "{status:?} {error}");
     }
 }
+
+/// A start in the middle: told, and confirmed by a key or an option; else nothing moves.
+#[test]
+fn a_program_is_begun_at_a_line() {
+    let workspace = Workspace::new("from_line");
+    workspace.put("part.ngc", "G21 G90 G61\nG1 X1 F1200\n(here)\nG1 X2 Y1\nX3\nM2\n");
+    let send = ["send", "part.ngc", "--port", "simulator", "--enable", "--from-line"];
+    let (status, out, error) = outcome(workspace.command(&send).arg("3"));
+    assert_eq!(status, Some(3), "{out} {error}");
+    for told in [
+        "begins at line 4 of part.ngc, the next one with motion",
+        "where the machine stands: spindle off, coolant off",
+        "then it moves straight from X 0.000 Y 0.000 Z 0.000 to X 1.000 Y 0.000 Z 0.000, slowly",
+        "tool: the program has changed none",
+        "nobody confirms, and nothing was moved: --yes confirms",
+    ] {
+        assert!(out.contains(told), "{out}");
+    }
+    assert!(!out.contains("moving"), "{out}");
+    let (status, out, error) = outcome(workspace.command(&send).args(["4", "--yes"]));
+    assert_eq!(status, Some(0), "{out} {error}");
+    assert!(
+        out.contains("program: idle at X 1.000 Y 0.000") && out.contains("idle at X 3.000 Y 1.000"),
+        "{out}"
+    );
+    let (status, _, error) = outcome(workspace.command(&send).args(["12", "--yes"]));
+    assert_eq!(status, Some(2), "{error}");
+    assert!(error.starts_with("motion: part.ngc:12: found a program of 6 lines, expected"), "{error}");
+    // By the key.
+    let mut child = workspace
+        .command(&send)
+        .arg("5")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("a process");
+    let mut keys = child.stdin.take().expect("piped");
+    let lines = BufReader::new(child.stdout.take().expect("piped")).lines().map_while(Result::ok);
+    let mut told = Vec::new();
+    for line in lines {
+        if line.starts_with("r with Enter confirms") {
+            writeln!(keys, "r").expect("it reads");
+        }
+        told.push(line);
+    }
+    let confirmed = told.iter().position(|line| line.starts_with("r with Enter")).expect("asked");
+    assert!(
+        told[..confirmed].iter().all(|line| !line.contains("enabling") && !line.contains("moving")),
+        "{told:?}"
+    );
+    assert_eq!(
+        (child.wait().expect("an end").code(), told.last().map(String::as_str)),
+        (Some(0), Some("done"))
+    );
+}
+
+/// A sender is killed in the middle, as by a power cut of the PC; then the board's power goes, too.
+#[test]
+fn a_program_is_gone_on_with_after_power_cuts() {
+    let workspace = Workspace::new("resume");
+    let lines: String = (1..=60).map(|line| format!("G1 X{line} Y{}\n", line % 2)).collect();
+    let part = format!("G21 G90 G61 F1200\n{lines}M2\n");
+    workspace.put("part.ngc", &part);
+    workspace.put("notes.txt", "not a journal");
+    let board = Board::start(&workspace);
+    let send = |port: &str, journal: &str| {
+        workspace.command(&["send", "part.ngc", "--port", port, "--enable", "--journal", journal])
+    };
+    let resume = |port: &str, more: &[&str]| {
+        outcome(workspace.command(&["resume", "part.journal", "--port", port]).args(more))
+    };
+    // Nothing of the user's is written over.
+    let (status, _, error) = outcome(&mut send(&board.1, "notes.txt"));
+    assert_eq!((status, workspace.read("notes.txt").as_str()), (Some(2), "not a journal"), "{error}");
+    assert!(error.contains("notes.txt: found no journal, expected"), "{error}");
+    let driven_at_least = |count: u64| {
+        let journal = std::fs::read(workspace.0.join("part.journal")).ok();
+        let record: Option<Value> = journal.and_then(|text| serde_json::from_slice(&text).ok());
+        record.is_some_and(|record| record["driven"].as_u64().expect("a count") >= count)
+    };
+    let cut = |child: &mut Child, count: u64| {
+        while !driven_at_least(count) {
+            assert_eq!(child.try_wait().expect("a process"), None, "before it was cut");
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        child.kill().expect("it runs");
+        child.wait().expect("an end");
+    };
+    let quiet = |command: &mut Command| {
+        command.stdin(Stdio::piped()).stdout(Stdio::null()).spawn().expect("a process")
+    };
+    cut(&mut quiet(&mut send(&board.1, "part.journal")), 4);
+    // Another program, though by one figure.
+    workspace.put("part.ngc", &part.replace("X60", "X61"));
+    let (status, _, error) = resume(&board.1, &["--yes"]);
+    assert!(status == Some(2) && error.contains("part.ngc with the checksum"), "{status:?} {error}");
+    workspace.put("part.ngc", &part);
+    // The board has run since, and knows where it is; nobody confirms, and then it is confirmed.
+    let (status, out, error) = resume(&board.1, &[]);
+    assert_eq!(status, Some(3), "{out} {error}");
+    assert!(out.contains("was interrupted in line") && out.contains("nobody confirms"), "{out}");
+    cut(&mut quiet(&mut workspace.command(&["resume", "part.journal", "--port", &board.1, "--yes"])), 20);
+    drop(board);
+    let board = Board::start(&workspace);
+    let (status, _, error) = resume(&board.1, &["--yes", "--enable"]);
+    assert!(status == Some(2) && error.contains("expected --homed"), "{status:?} {error}");
+    let (status, out, error) = resume(&board.1, &["--yes", "--enable", "--homed"]);
+    assert_eq!(status, Some(0), "{out} {error}");
+    assert!(out.contains("idle at X 60.000 Y 0.000") && !out.contains("goes on at line 2\n"), "{out}");
+    let (status, _, error) = resume(&board.1, &["--yes"]);
+    assert!(status == Some(2) && error.contains("driven to its end"), "{status:?} {error}");
+    // The place where journals are without the option.
+    let (status, _, error) = outcome(&mut workspace.command(&["resume", "--port", &board.1]));
+    assert!(status == Some(2) && error.contains("motion/tcp-127-0-0-1-"), "{status:?} {error}");
+}

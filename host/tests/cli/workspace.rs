@@ -28,7 +28,8 @@ impl Workspace {
     /// `motion` in this directory, to be started.
     pub(crate) fn command(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_motion"));
-        command.args(arguments).current_dir(&self.0);
+        // Journals stay in here, too.
+        command.args(arguments).current_dir(&self.0).env("XDG_STATE_HOME", &self.0);
         command
     }
 

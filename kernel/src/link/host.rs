@@ -243,6 +243,15 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         self.is_unreadable = false;
     }
 
+    /// The number of the board's start, once it has answered.
+    #[must_use]
+    pub const fn session(&self) -> Option<u32> {
+        match self.session {
+            Session::Greeted(session) | Session::Ready(session) => Some(session),
+            Session::Unknown | Session::Lost(_) | Session::Replaced => None,
+        }
+    }
+
     /// Whether the board has confirmed the controls.
     #[must_use]
     pub const fn is_controlled(&self) -> bool {

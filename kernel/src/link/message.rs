@@ -7,7 +7,7 @@ use crate::hal::BoardOutputs;
 use crate::units::Position;
 
 /// The version of this protocol. A PC refuses a board of another version.
-pub const PROTOCOL: u16 = 5;
+pub const PROTOCOL: u16 = 6;
 
 /// From the PC.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -218,6 +218,9 @@ pub struct Status<const AXES: usize> {
     pub aborts: u16,
     /// The number of the first item that was not taken into the streams: motion is somewhere before it.
     pub taken: u32,
+    /// How many pieces of path and ends of stretches of it are driven to their end: motion is on the next one, or at rest
+    /// before it.
+    pub driven: u32,
     /// The end of the program has come.
     pub is_ended: bool,
     /// Stops on the path because items came too late.

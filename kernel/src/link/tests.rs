@@ -203,6 +203,7 @@ impl Bench {
             line: 7,
             aborts: self.board.items.came().aborts,
             taken: self.board.items.taken(),
+            driven: 0,
             is_ended: self.board.items.came().is_ended,
             starvations: 3,
             is_ready: true,

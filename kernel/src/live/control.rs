@@ -123,6 +123,16 @@ where
         self.starvations
     }
 
+    /// How many pieces of path and ends of stretches are driven to their end, since it began or was restarted: motion is on
+    /// the next one, or at rest before it. 0 once the program is given up.
+    pub fn driven(&self, feeder: &LiveFeeder<'_, R, AXES>) -> u32 {
+        if self.mode.run() == Run::Abort {
+            return 0;
+        }
+        // The one under way is queued.
+        self.reader.lookahead().queued().wrapping_sub(feeder.path_queued() as u32)
+    }
+
     /// Whether it is at rest because the override is 0.
     pub fn is_stopped_by_override(&self, feeder: &LiveFeeder<'_, R, AXES>) -> bool {
         self.mode.feed_override() <= 0.0 && self.rests(feeder)

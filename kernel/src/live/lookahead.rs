@@ -132,6 +132,11 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         pushed.map_err(|_| Rejection::full("block ends ahead", PLACES))
     }
 
+    /// Number of pieces and ends of stretches queued so far.
+    pub(super) fn queued(&self) -> u32 {
+        self.queued
+    }
+
     /// Notes that the end of a stretch's path was queued.
     pub(super) fn queued_end_of_stretch(&mut self) {
         self.line = None;

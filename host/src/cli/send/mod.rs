@@ -1,5 +1,8 @@
 //! `motion send`: drives a program on a board.
 
+mod confirm;
+mod journal;
+pub mod resume;
 mod shown;
 mod stops;
 
@@ -12,20 +15,28 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use motion_kernel::link::State;
 use motion_kernel::num::{Fixed, Root};
+use motion_kernel::program::Checksum;
 
+use self::confirm::Middle;
+use self::journal::{Journal, Subject};
+use self::resume::Resumed;
 use self::shown::Shown;
 pub(super) use self::shown::state_words;
 use self::stops::Stops;
 use super::error::{CliError, Outcome};
 use super::input;
 use super::port::PortArguments;
-use crate::board::sender::{Found, Permissions, check_outputs};
+use crate::board::from_line::from_line;
+use crate::board::progress::{Place, Progress};
+use crate::board::sender::{Found, Permissions, check, check_outputs};
 use crate::board::{BoardError, Connection, Heard, Job, Port, Sender, Step};
 use crate::files::STANDARD_INPUT;
 use crate::files::interrupt::{self, Asked};
 use crate::gcode::Program;
 use crate::machine::{Machine, on_machine};
-use crate::planning::{Executable, Mode as PlanMode, Plan, on_axis_count, plan_program, require_outputs};
+use crate::planning::{
+    Executable, Mode as PlanMode, Plan, PlanningError, on_axis_count, plan_program, require_outputs,
+};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -36,8 +47,14 @@ Examples:
                                                      on a board at a serial port, with its drives on
   motion send part.ngc --port /dev/ttyACM0 --continue
                                                      goes on after what the board has of the program
+  motion send part.ngc --port /dev/ttyACM0 --from-line 120
+                                                     begins at the path of line 120
 
 The board first moves straight to the program's start, slowly, then drives the program.
+
+--from-line reads the whole program: offsets, tool, spindle and coolant are those of that line. What comes first is told
+and waits for r: spindle and coolant are switched where the machine stands, then it moves straight to where that line's path
+begins, so bring it to a place from where that way is free. A rounded corner belongs to the line before it.
 
 Keys, each with Enter: h holds, r resumes (also from a program stop), a aborts, + and - change the override by 10 %, 0
 resets it, s switches single block. Ctrl-C holds; Ctrl-C again ends this command, and the board stays held. A request to end
@@ -63,6 +80,17 @@ pub struct SendArguments {
     machine: Option<PathBuf>,
     #[command(flatten)]
     reading: input::ReadingArguments,
+    /// Begin in the middle: at the path of this line of the program, or of the next one with motion. What was before is read,
+    /// and not driven.
+    #[arg(long, value_name = "LINE", conflicts_with = "continues")]
+    from_line: Option<u32>,
+    /// Confirm the first motion of --from-line, for scripts.
+    #[arg(long, requires = "from_line")]
+    yes: bool,
+    /// Where to remember how far the program is, for `motion resume`. Without it, a file of the port in the user's state
+    /// folder ($XDG_STATE_HOME/motion or ~/.local/state/motion); none for `simulator`, nor for a program from standard input.
+    #[arg(long, value_name = "FILE")]
+    journal: Option<PathBuf>,
     /// Switch the drives on if they are off.
     #[arg(long)]
     enable: bool,
@@ -92,47 +120,66 @@ pub struct SendArguments {
 /// # Errors
 /// The program, the machine file or the board is refused, or the board is in a fault.
 pub fn send(arguments: &SendArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+    send_program(arguments, None, out)
+}
+
+/// The same; or what is left of a program that was interrupted.
+fn send_program(
+    arguments: &SendArguments,
+    resumed: Option<&Resumed>,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
     let machine = input::any_machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
     let program = arguments.reading.program(&source, machine.read_options())?;
+    let program = Sent { arguments, resumed, program: &program, sum: Checksum::of(&source.text) };
     on_machine!(machine, machine => {
         if !arguments.no_spindle {
-            require_outputs(&source.name, &program, machine)?;
+            require_outputs(&source.name, program.program, machine)?;
         }
-        let plan = plan_program(&source.name, &program, machine, PlanMode::Spanning)?;
+        let plan = plan_program(&source.name, program.program, machine, PlanMode::Spanning)?;
         if let Some(probe) = plan.probes.first() {
             return Err(CliError::NoProbeInput { program: source.name.clone(), line: probe.line });
         }
         for notice in plan.notices.iter().filter(|_| !arguments.json) {
             writeln!(out, "note: {notice}").map_err(CliError::Output)?;
         }
-        send_plan(arguments, (&program, &plan), machine, out)
+        send_plan(&program, &plan, machine, out)
     })
 }
 
+/// What is asked for, and the program read.
+struct Sent<'a> {
+    arguments: &'a SendArguments,
+    resumed: Option<&'a Resumed>,
+    program: &'a Program,
+    /// The checksum of its file.
+    sum: u32,
+}
+
 fn send_plan<const N: usize>(
-    arguments: &SendArguments,
-    (program, plan): (&Program, &Plan<N>),
+    sent: &Sent<'_>,
+    plan: &Plan<N>,
     machine: &Machine<N>,
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
-    if arguments.port.port == Port::Simulator {
+    let port = &sent.arguments.port;
+    if port.port == Port::Simulator {
         let job = job::<f32, N, N>(plan, machine)?;
-        let (mut connection, _board) = arguments.port.simulated(machine)?;
-        greet(&mut connection).map_err(|error| arguments.port.refused(error))?;
-        let stops = Stops::new(program, plan, &job);
-        return drive(arguments, (&job, stops), machine, connection, out);
+        let (mut connection, _board) = port.simulated(machine)?;
+        greet(&mut connection).map_err(|error| port.refused(error))?;
+        return send_job::<f32, N, N>(sent, (plan, job), machine, connection, out);
     }
     on_axis_count!(machine.axis_count(), M => {
-        let mut job = job::<f32, N, M>(plan, machine)?;
-        let mut connection = arguments.port.open::<M>()?;
+        let job = job::<f32, N, M>(plan, machine)?;
+        let mut connection = port.open::<M>()?;
         // The number type is the board's.
-        greet(&mut connection).map_err(|error| arguments.port.refused(error))?;
+        greet(&mut connection).map_err(|error| port.refused(error))?;
         if connection.identity().is_some_and(|identity| identity.is_fixed_point) {
-            job = self::job::<Fixed, N, M>(plan, machine)?;
+            let job = self::job::<Fixed, N, M>(plan, machine)?;
+            return send_job::<Fixed, N, M>(sent, (plan, job), machine, connection, out);
         }
-        let stops = Stops::new(program, plan, &job);
-        drive(arguments, (&job, stops), machine, connection, out)
+        send_job::<f32, N, M>(sent, (plan, job), machine, connection, out)
     })
 }
 
@@ -143,6 +190,90 @@ fn job<R: Root, const N: usize, const M: usize>(
 ) -> Result<Job<M>, CliError> {
     machine.axes_config::<R>().map_err(|source| CliError::Axis { machine: machine.name.clone(), source })?;
     Ok(Job::new(machine, &Executable::new::<R>(plan)?.items))
+}
+
+/// Drives the job, or the rest of it that is asked for.
+fn send_job<R: Root, const N: usize, const M: usize>(
+    sent: &Sent<'_>,
+    (plan, whole): (&Plan<N>, Job<M>),
+    machine: &Machine<N>,
+    connection: Connection<M>,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
+    let &Sent { arguments, resumed, program, sum } = sent;
+    let mut found = match (arguments.continues, arguments.restart) {
+        (true, _) => Found::Continued,
+        (_, true) => Found::GivenUp,
+        _ => Found::Stays,
+    };
+    // Another machine is refused before another program.
+    if let (Some(_), Some(identity)) = (resumed, connection.identity()) {
+        check(&whole, identity).map_err(|error| arguments.port.refused(error))?;
+    }
+    let stops = Stops::new(program, plan, &whole);
+    let (machine_sum, name_of_whole) = (whole.machine, whole.name);
+    let (job, middle) = match (resumed, arguments.from_line) {
+        (Some(resumed), _) => {
+            // What the board has of it is driven again from where the journal was.
+            if resumed.is_of(connection.controls().program) {
+                found = Found::GivenUp;
+            }
+            let (job, middle) = resumed.rest::<R, M>(program, &whole, arguments.yes, &connection)?;
+            (job, Some(middle))
+        }
+        (None, Some(line)) => {
+            let (job, middle) = from_line_on::<R, M>(arguments, program, &whole, line)?;
+            (job, Some(middle))
+        }
+        (None, None) => (whole, None),
+    };
+    let subject = Subject {
+        program_sum: sum,
+        machine_sum,
+        job: name_of_whole,
+        session: connection.session(),
+        name: job.name,
+    };
+    let journal = Journal::open(arguments, &subject)?;
+    let stops = stops.skip(job.begin.stops);
+    drive(arguments, Driven { job: &job, found, stops, middle, journal }, machine, connection, out)
+}
+
+/// What is driven, and what goes with it.
+struct Driven<'a, const M: usize> {
+    job: &'a Job<M>,
+    found: Found,
+    stops: Stops,
+    /// It begins in the middle.
+    middle: Option<Middle>,
+    journal: Option<Journal>,
+}
+
+/// The job from a line on, and what there is to confirm.
+fn from_line_on<R: Root, const M: usize>(
+    arguments: &SendArguments,
+    program: &Program,
+    whole: &Job<M>,
+    line: u32,
+) -> Result<(Job<M>, Middle), CliError> {
+    let name = arguments.program.display().to_string();
+    let found = from_line(program, &whole.items, line).map_err(|source| CliError::FromLine {
+        program: name.clone(),
+        line,
+        source,
+    })?;
+    let job = whole.from_item::<R>(found.item).map_err(|(line, problem)| PlanningError {
+        source_name: name.clone(),
+        place: line.into(),
+        problem,
+    })?;
+    let why = match found.line {
+        same if same == line => "",
+        later if later > line => ", the next one with motion",
+        _ => ", whose path goes on there",
+    };
+    let place = format!("begins at line {} of {name}{why}", found.line);
+    Ok((job, Middle { place, tool: found.tool, is_confirmed: arguments.yes }))
 }
 
 /// Waits for the board's answer: what it is.
@@ -195,18 +326,14 @@ fn keys(arguments: &SendArguments) -> Receiver<Typed> {
 
 fn drive<const N: usize, const M: usize>(
     arguments: &SendArguments,
-    (job, stops): (&Job<M>, Stops),
+    driven: Driven<'_, M>,
     machine: &Machine<N>,
     mut connection: Connection<M>,
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
     let refused = |error: BoardError| arguments.port.refused(error);
     let names: Vec<String> = machine.driven_axes().iter().map(|axis| axis.name.clone()).collect();
-    let found = match (arguments.continues, arguments.restart) {
-        (true, _) => Found::Continued,
-        (_, true) => Found::GivenUp,
-        _ => Found::Stays,
-    };
+    let Driven { job, found, stops, middle, mut journal } = driven;
     let may = Permissions {
         enables: arguments.enable,
         clears_fault: arguments.clear_fault,
@@ -214,13 +341,19 @@ fn drive<const N: usize, const M: usize>(
         found,
     };
     let mut sender = Sender::new(job, &names, may);
+    let mut progress = Progress::new(job.begin.path, job.header.tick_s);
     if let Some(identity) = connection.identity() {
-        sender.check(identity).map_err(refused)?;
+        check(job, identity).map_err(refused)?;
         let program = arguments.program.display().to_string();
         check_outputs(&program, job, identity.outputs).map_err(refused)?;
     }
     let keys = keys(arguments);
     let mut shown = Shown::new(arguments, &names, stops, job.items.len() as u64);
+    if let Some(middle) = &middle
+        && let Some(outcome) = middle.confirm(job, &mut connection, &keys, &shown, out)?
+    {
+        return Ok(outcome);
+    }
     interrupt::hold_first();
     let (mut is_attended, mut waits_since) = (true, Instant::now());
     loop {
@@ -263,8 +396,19 @@ fn drive<const N: usize, const M: usize>(
         }
         let step = sender.advance(&mut connection).map_err(refused)?;
         shown.show(out, step, &connection)?;
+        if let Some(journal) = &mut journal {
+            note(journal, &mut progress, &sender, &connection, names.len());
+        }
+        if let Some(failure) = journal.as_mut().and_then(Journal::failure) {
+            shown.say(out, &format!("the journal is not written any more: {failure}"))?;
+        }
         match step {
-            Step::Done => return shown.end(out, "done").map(|()| Outcome::Done),
+            Step::Done => {
+                shown.end(out, "done")?;
+                let Some(mut journal) = journal else { return Ok(Outcome::Done) };
+                journal.finish();
+                return journal.close().map(|()| Outcome::Done).map_err(CliError::Unwritten);
+            }
             Step::Aborted => return shown.end(out, "aborted").map(|()| Outcome::Aborted),
             _ => {}
         }
@@ -282,6 +426,23 @@ fn drive<const N: usize, const M: usize>(
             let what = format!("nobody resumes: the board stays held{goes_on}");
             return shown.end(out, &what).map(|()| Outcome::Held);
         }
+    }
+}
+
+/// Notes in the journal how far the program is.
+fn note<const M: usize>(
+    journal: &mut Journal,
+    progress: &mut Progress,
+    sender: &Sender<'_, M>,
+    connection: &Connection<M>,
+    axes: usize,
+) {
+    if let Some(status) = connection.status()
+        && let Some(driven) = sender.driven(status)
+    {
+        let place = progress.tell(status.tick, Place { driven, line: status.line });
+        let set_mm = status.set.iter().take(axes).map(|position| position.to_mm()).collect();
+        journal.note(place, set_mm);
     }
 }
 

@@ -42,6 +42,20 @@ impl<'a> Shown<'a> {
         self.bar.suspend(|| writeln!(out, "{text}").and_then(|()| out.flush())).map_err(CliError::Output)
     }
 
+    /// A line that scripts are to have, too.
+    pub(super) fn tell(&self, out: &mut dyn Write, text: &str) -> Result<(), CliError> {
+        if self.is_json {
+            let line = serde_json::json!({ "step": "confirmation", "text": text });
+            return writeln!(out, "{line}").and_then(|()| out.flush()).map_err(CliError::Output);
+        }
+        self.say(out, text)
+    }
+
+    /// The names of the machine's axes.
+    pub(super) fn axes(&self) -> &'a [String] {
+        self.axes
+    }
+
     pub(super) fn end(&self, out: &mut dyn Write, text: &str) -> Result<(), CliError> {
         self.bar.finish_and_clear();
         self.say(out, text)
@@ -69,18 +83,13 @@ impl<'a> Shown<'a> {
         if step == Step::Drives {
             self.bar.set_position(u64::from(status.taken));
         }
-        let position: Vec<String> = self
-            .axes
-            .iter()
-            .zip(status.set)
-            .map(|(name, set)| format!("{name} {:.3}", set.to_mm()))
-            .collect();
+        let position = at(self.axes, &status.set);
         let percent = f64::from(connection.controls().override_permille) * 0.1;
         let state = state_words(status.state);
         let text = format!(
             "{state}, line {}  {}  F {:.0} mm/min  {percent:.0} %",
             status.line,
-            position.join("  "),
+            position,
             status.feed_mm_s * 60.0
         );
         self.bar.set_message(text);
@@ -91,7 +100,7 @@ impl<'a> Shown<'a> {
                 None
             };
             let why = why.map_or_else(String::new, |why| format!(": {why}; r goes on"));
-            self.say(out, &format!("{}: {state} at {}{why}", step_words(step), position.join(" ")))?;
+            self.say(out, &format!("{}: {state} at {}{why}", step_words(step), position))?;
         }
         Ok(())
     }
@@ -118,6 +127,13 @@ impl<'a> Shown<'a> {
             "items": self.bar.length(),
         })
     }
+}
+
+/// A position, with the names of the axes.
+pub(super) fn at(axes: &[String], position: &[Position]) -> String {
+    let of_axes = axes.iter().zip(position);
+    let words: Vec<String> = of_axes.map(|(name, at)| format!("{name} {:.3}", at.to_mm())).collect();
+    words.join(" ")
 }
 
 /// The word for a step.

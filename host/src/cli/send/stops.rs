@@ -40,6 +40,11 @@ impl Stops {
         Self { places, next: 0 }
     }
 
+    /// Without the first ones.
+    pub(super) fn skip(self, count: usize) -> Self {
+        Self { next: count, ..self }
+    }
+
     /// What is said of the stop at `set`, the next one there.
     pub(super) fn at(&mut self, set: &[Position]) -> Option<&str> {
         let is_here = |(place, _): &(Vec<Position>, String)| place.starts_with(set);

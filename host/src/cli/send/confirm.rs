@@ -1,0 +1,110 @@
+//! What the operator is told, and confirms, before a program is begun in its middle.
+
+use std::io::Write;
+use std::sync::mpsc::{Receiver, TryRecvError};
+use std::time::Duration;
+
+use motion_kernel::hal::{OutputState, Spindle};
+use motion_kernel::program::Item;
+use motion_kernel::units::Position;
+
+use super::Typed;
+use super::shown::{Shown, at};
+use crate::board::{Connection, Job};
+use crate::cli::error::{CliError, Outcome};
+use crate::files::interrupt;
+
+/// A start in the middle of a program.
+pub(super) struct Middle {
+    /// Where it is, in words.
+    pub(super) place: String,
+    /// The tool that the program has in the spindle there; 0: none that it knows of.
+    pub(super) tool: u32,
+    /// It is confirmed already.
+    pub(super) is_confirmed: bool,
+}
+
+impl Middle {
+    /// Tells what comes first, and waits for the operator. None once it is confirmed; else what became of it.
+    pub(super) fn confirm<const M: usize>(
+        &self,
+        job: &Job<M>,
+        connection: &mut Connection<M>,
+        keys: &Receiver<Typed>,
+        shown: &Shown<'_>,
+        out: &mut dyn Write,
+    ) -> Result<Option<Outcome>, CliError> {
+        let mut is_told = false;
+        loop {
+            connection.step(Duration::from_millis(2), &mut |_| {});
+            if let Some(status) = connection.status()
+                && !std::mem::replace(&mut is_told, true)
+            {
+                for line in self.lines(job, &status.set, shown.axes()) {
+                    shown.tell(out, &line)?;
+                }
+            }
+            if is_told && self.is_confirmed {
+                return Ok(None);
+            }
+            if interrupt::take_asked().is_some() {
+                return shown.end(out, "ended: nothing was moved").map(|()| Some(Outcome::Held));
+            }
+            match keys.try_recv() {
+                Ok(Typed::Key('r')) if is_told => return Ok(None),
+                Ok(Typed::Key('a')) => {
+                    return shown.end(out, "given up: nothing was moved").map(|()| Some(Outcome::Aborted));
+                }
+                Ok(Typed::Key(_)) => shown.say(out, "r confirms, a gives up")?,
+                Ok(Typed::End) | Err(TryRecvError::Disconnected) if is_told && !self.is_confirmed => {
+                    let told = "nobody confirms, and nothing was moved: --yes confirms";
+                    return shown.end(out, told).map(|()| Some(Outcome::Held));
+                }
+                Ok(Typed::End) | Err(_) => {}
+            }
+        }
+    }
+
+    /// What comes first.
+    fn lines<const M: usize>(&self, job: &Job<M>, here: &[Position; M], axes: &[String]) -> Vec<String> {
+        let mut lines = vec![self.place.clone()];
+        let outputs = job.begin.lead.iter().find_map(|item| match item {
+            Item::Switch(to) => Some(*to),
+            _ => None,
+        });
+        lines.push(format!(
+            "at first, where the machine stands: {}",
+            outputs_words(&outputs.unwrap_or(OutputState::OFF))
+        ));
+        let (from, to) = (at(axes, here), at(axes, &job.header.start));
+        lines.push(if *here == job.header.start {
+            format!("the machine stands at {from}, where the path begins")
+        } else {
+            format!("then it moves straight from {from} to {to}, slowly")
+        });
+        lines.push(match self.tool {
+            0 => "tool: the program has changed none".to_owned(),
+            tool => format!("tool in the spindle: {tool}"),
+        });
+        if !self.is_confirmed {
+            lines.push("r with Enter confirms and begins, a gives up".to_owned());
+        }
+        lines
+    }
+}
+
+/// What spindle and coolant do.
+fn outputs_words(outputs: &OutputState) -> String {
+    let spindle = match outputs.spindle {
+        Spindle::Off => "spindle off".to_owned(),
+        Spindle::Clockwise => format!("spindle clockwise at {} rev/min", outputs.speed_rpm),
+        Spindle::Counterclockwise => format!("spindle counterclockwise at {} rev/min", outputs.speed_rpm),
+    };
+    let coolant = match (outputs.flood, outputs.mist) {
+        (false, false) => "coolant off",
+        (true, false) => "flood on",
+        (false, true) => "mist on",
+        (true, true) => "flood and mist on",
+    };
+    format!("{spindle}, {coolant}")
+}
