@@ -8,11 +8,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use motion_host::board::items::{InPlanning, Source};
 use motion_host::board::job::parameters;
 use motion_host::board::parameters::{Figures, read, write};
 use motion_host::board::sender::{Found, Permissions};
 use motion_host::board::simulator::{self, SimulatedBoard};
 use motion_host::board::{BoardError, Connection, Heard, Job, Port, Sender, Step};
+use motion_host::gcode::ReadOptions;
 use motion_host::machine::Machine;
 use motion_host::planning::Executable;
 use motion_kernel::link::{State, WriteError};
@@ -65,10 +67,18 @@ fn drive(
     job: &Job<3>,
     may: Permissions,
     connection: &mut Connection<3>,
-    mut each: impl FnMut(&mut Connection<3>, &mut Sender<'_, 3>, &[Heard<3>]) -> bool,
+    each: impl FnMut(&mut Connection<3>, &mut Sender<'_, 3>, &[Heard<3>]) -> bool,
 ) -> Result<Step, BoardError> {
     let names = ["X", "Y", "Z"].map(str::to_owned);
-    let (mut sender, begin) = (Sender::new(job, &names, may), Instant::now());
+    drive_sender(Sender::new(job, &names, may), connection, each)
+}
+
+fn drive_sender(
+    mut sender: Sender<'_, 3>,
+    connection: &mut Connection<3>,
+    mut each: impl FnMut(&mut Connection<3>, &mut Sender<'_, 3>, &[Heard<3>]) -> bool,
+) -> Result<Step, BoardError> {
+    let begin = Instant::now();
     loop {
         assert!(begin.elapsed() < LONGEST, "it hangs: {:?} {:?}", sender.step(), connection.status());
         let mut heard = Vec::new();
@@ -223,8 +233,7 @@ fn another_sender_goes_on() {
     // Who does not say what is to become of it.
     let refused = drive(&job, ENABLES, &mut connect(address, 6), |_, _, _| false);
     let of = job.items.len() as u32 + 1;
-    let is_begun =
-        matches!(refused, Err(BoardError::Begun { has, of: all }) if all == of && (1..of).contains(&has));
+    let is_begun = matches!(refused, Err(BoardError::Begun { has, of: all }) if all == Some(of) && (1..of).contains(&has));
     assert!(is_begun, "{refused:?}");
     let mut connection = connect(address, 7);
     let mut first = None;
@@ -238,6 +247,50 @@ fn another_sender_goes_on() {
     assert_eq!(step.expect("driven"), Step::Done);
     assert!(first.is_some_and(|first| (1..=gone_at).contains(&first)), "{first:?} {gone_at}");
     assert_eq!(stands(&connection), end(&job));
+}
+
+/// A program that is read and planned while it is driven: given up in the middle, gone on with by another sender; and one
+/// with a line at fault, which ends at rest before that line.
+#[test]
+fn a_program_is_planned_while_it_is_driven() {
+    let machine = Machine::reference();
+    let text = zigzag(300);
+    let whole = job(&text, &machine);
+    let (_board, address) = board(&machine, 21);
+    let names = ["X", "Y", "Z"].map(str::to_owned);
+    let job = Job::<3>::in_planning(&machine, 7);
+    let planned = |text: &str| {
+        let source = Source {
+            name: "part.ngc".to_owned(),
+            text: text.as_bytes().to_vec(),
+            options: ReadOptions::default(),
+            leaves_out_outputs: false,
+        };
+        InPlanning::begin::<f32, 3>(source, &machine)
+    };
+    let mut connection = connect(address, 1);
+    let sender = Sender::planned(&job, planned(&text), &names, ENABLES);
+    let given_up = drive_sender(sender, &mut connection, |connection, sender, _| {
+        sender.step() == Step::Drives && connection.next().is_some_and(|next| next > 300)
+    });
+    given_up.expect("no fault");
+    drop(connection);
+    let mut connection = connect(address, 2);
+    let continued = Permissions { found: Found::Continued, ..ENABLES };
+    let sender = Sender::planned(&job, planned(&text), &names, continued);
+    assert_eq!(drive_sender(sender, &mut connection, |_, _, _| false).expect("driven"), Step::Done);
+    assert_eq!(stands(&connection), end(&whole));
+    // Each item once, and the end.
+    let taken = connection.status().map(|status| status.taken);
+    assert_eq!(taken, Some(whole.items.len() as u32 + 1));
+
+    let wrong = text.replace("M2", "G1 X0 Y0\nG1 X5 Q");
+    let sender = Sender::planned(&job, planned(&wrong), &names, ENABLES);
+    let refused = drive_sender(sender, &mut connection, |_, _, _| false);
+    let Err(BoardError::Program(error)) = refused else { panic!("{refused:?}") };
+    assert!(error.to_string().starts_with("part.ngc:303:"), "{error}");
+    assert_eq!(stands(&connection), [Position::ZERO; 3]);
+    assert_eq!(connection.status().map(|status| status.state), Some(State::Idle));
 }
 
 /// A board that was reset knows nothing; the sender says where its program was.

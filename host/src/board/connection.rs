@@ -231,6 +231,13 @@ impl<const N: usize> Connection<N> {
         self.link.write_parameters(parameters, offset);
     }
 
+    /// Whether the board has confirmed and taken everything that was pushed.
+    #[must_use]
+    pub fn has_all(&self) -> bool {
+        let taken = self.status().map(|status| status.taken);
+        self.link.waiting() == 0 && taken == Some(self.link.confirmed())
+    }
+
     /// Whether everything that was pushed is confirmed and taken into motion, and that has come to its end.
     #[must_use]
     pub fn is_driven(&self) -> bool {

@@ -76,14 +76,15 @@ pub enum BoardError {
     },
     /// The board has a part of this program.
     #[error(
-        "found {has} of the program's {of} items (its end is one) on the board, expected --continue to go on after them, or --restart to \
-         give them up"
+        "found {has} of the program's {}items (its end is one) on the board, expected --continue to go on after them, or --restart to \
+         give them up",
+        .of.map_or_else(String::new, |of| format!("{of} "))
     )]
     Begun {
         /// Items that the board has.
         has: u32,
-        /// Items of the program.
-        of: u32,
+        /// Items of the program, where that is known.
+        of: Option<u32>,
     },
     /// The program can't be gone on with.
     #[error(
@@ -108,6 +109,9 @@ pub enum BoardError {
     /// The board has nothing of this program.
     #[error("found nothing of this program on the board, expected some of it for --continue")]
     NotBegun,
+    /// The program can't be read or planned to its end. What was before has been driven.
+    #[error("{0}")]
+    Program(Box<dyn std::error::Error + Send + Sync>),
     /// There is no way to the program's start.
     #[error("found no way to the program's start: {0}")]
     NoWay(motion_kernel::straight::StraightError),
@@ -175,6 +179,7 @@ impl BoardError {
             | Self::Begun { .. }
             | Self::Busy
             | Self::NotBegun
+            | Self::Program(_)
             | Self::Interrupted { .. }
             | Self::Parameters(_)
             | Self::NoWay(_) => true,

@@ -50,6 +50,12 @@ impl<const M: usize> Job<M> {
         }
     }
 
+    /// The job of items that are planned while they are driven, with a name of its own.
+    #[must_use]
+    pub fn in_planning<const N: usize>(machine: &Machine<N>, name: u32) -> Self {
+        Self { name: name.max(1), ..Self::new(machine, &[]) }
+    }
+
     /// What is left of a whole job from an item on, for a kernel of the number type `R`: a job of its own, with its own name.
     /// Within a stretch it begins at rest, at the start of the piece of path that the item belongs to; the feed over the rest
     /// of the stretch is planned anew, and its first block is shorter. All other items stay as they are.

@@ -18,6 +18,7 @@
 pub mod port;
 pub mod wire;
 pub mod connection;
+pub mod items;
 pub mod job;
 pub mod from_line;
 pub mod sender;
@@ -29,6 +30,7 @@ pub mod error;
 
 pub use connection::{Connection, Heard};
 pub use error::BoardError;
+pub use items::InPlanning;
 pub use job::Job;
 pub use port::Port;
 pub use sender::{Sender, Step};

@@ -12,6 +12,7 @@ use motion_kernel::straight::Straight;
 
 use super::connection::{Connection, Heard};
 use super::error::{Agreement, BoardError};
+use super::items::{InPlanning, Items, Next, Said};
 use super::job::Job;
 use crate::simulate::faults;
 
@@ -75,6 +76,12 @@ pub enum Step {
 /// Drives a job.
 pub struct Sender<'a, const M: usize> {
     job: &'a Job<M>,
+    items: Items<'a, M>,
+    /// Items that the board has from another sender, which are to be skipped.
+    skips: u32,
+    /// The end of the program under way is pushed.
+    is_ended: bool,
+    outputs: OutputCheck,
     /// Names of the machine's axes, for errors.
     axes: &'a [String],
     may: Permissions,
@@ -93,8 +100,35 @@ impl<'a, const M: usize> Sender<'a, M> {
     /// Before the greeting.
     #[must_use]
     pub fn new(job: &'a Job<M>, axes: &'a [String], may: Permissions) -> Self {
-        let since = Instant::now();
-        Self { job, axes, may, step: Step::Greets, since, is_held: false, way: Vec::new(), pushed: 0 }
+        Self::of(job, Items::Whole { items: &job.items, next: 0 }, axes, may)
+    }
+
+    /// The same of a job whose items are planned while they are driven.
+    #[must_use]
+    pub fn planned(job: &'a Job<M>, planned: InPlanning<M>, axes: &'a [String], may: Permissions) -> Self {
+        Self::of(job, Items::Planned(planned), axes, may)
+    }
+
+    fn of(job: &'a Job<M>, items: Items<'a, M>, axes: &'a [String], may: Permissions) -> Self {
+        Self {
+            job,
+            items,
+            skips: 0,
+            is_ended: false,
+            outputs: OutputCheck::default(),
+            axes,
+            may,
+            step: Step::Greets,
+            since: Instant::now(),
+            is_held: false,
+            way: Vec::new(),
+            pushed: 0,
+        }
+    }
+
+    /// What the program has said since the last call, where it is planned while it is driven.
+    pub fn take_said(&mut self) -> Vec<Said> {
+        self.items.take_said()
     }
 
     /// How far it is.
@@ -234,7 +268,7 @@ impl<'a, const M: usize> Sender<'a, M> {
         {
             return Err(self.fault(fault));
         }
-        let of = self.job.items.len() as u32 + 1;
+        let of = self.items.count().map(|count| count as u32 + 1);
         let program = connection.controls().program;
         let is_mine = program == self.job.name && next > 0;
         let is_finished = status.state == State::Idle && status.taken == next && status.is_ended;
@@ -250,8 +284,7 @@ impl<'a, const M: usize> Sender<'a, M> {
                 return Err(BoardError::Interrupted { why: "the drives off" });
             }
             Found::Continued => {
-                self.pushed = next as usize;
-                self.job.items.iter().take(self.pushed).for_each(|item| connection.skip(item));
+                (self.pushed, self.skips) = (next as usize, next);
                 self.go(Step::Drives);
                 self.run(connection);
                 return Ok(());
@@ -293,7 +326,7 @@ impl<'a, const M: usize> Sender<'a, M> {
             self.begin(connection);
             return Ok(());
         }
-        self.pushed = 0;
+        (self.pushed, self.is_ended) = (0, false);
         self.run(connection);
         self.go(Step::ToStart);
         Ok(())
@@ -301,7 +334,8 @@ impl<'a, const M: usize> Sender<'a, M> {
 
     /// Begins the job's program.
     fn begin(&mut self, connection: &mut Connection<M>) {
-        self.pushed = 0;
+        (self.pushed, self.is_ended) = (0, false);
+        self.items.rewind();
         let _ = connection.command(|link| link.begin(self.job.name));
         self.run(connection);
         self.go(Step::Drives);
@@ -321,21 +355,17 @@ impl<'a, const M: usize> Sender<'a, M> {
 
     /// Pushes items, and sees whether all are driven.
     fn drive(&mut self, status: &Status<M>, connection: &mut Connection<M>) -> Result<(), BoardError> {
-        let of_job: &[Item<M>] = if self.step == Step::ToStart { &[] } else { &self.job.items };
         match status.state {
             State::Off => return Err(BoardError::SwitchedOff),
             State::Refused => return Err(BoardError::Item { at: self.line_at(status.taken) }),
             _ => {}
         }
-        let (ahead, count) = (self.way.len(), self.way.len() + of_job.len());
-        while self.pushed <= count {
-            let item = self.way.get(self.pushed).or_else(|| of_job.get(self.pushed.checked_sub(ahead)?));
-            if !connection.push(item).map_err(BoardError::Push)? {
-                break;
-            }
-            self.pushed += 1;
+        self.push(connection)?;
+        let is_at_rest = matches!(status.state, State::Starved | State::Idle) && connection.has_all();
+        if self.is_ended && is_at_rest && self.step == Step::Drives && self.items.has_failed() {
+            return self.items.take_failure().map_or(Ok(()), Err);
         }
-        if self.pushed > count && connection.is_driven() {
+        if self.is_ended && connection.is_driven() {
             if self.step == Step::ToStart {
                 self.way.clear();
                 self.begin(connection);
@@ -344,6 +374,55 @@ impl<'a, const M: usize> Sender<'a, M> {
             }
         }
         Ok(())
+    }
+
+    /// Pushes items while there is room for them, and behind the last one the end.
+    fn push(&mut self, connection: &mut Connection<M>) -> Result<(), BoardError> {
+        let has = connection.identity().map(|identity| identity.outputs);
+        while !self.is_ended {
+            let next = match self.way.get(self.pushed) {
+                Some(item) => Next::Item(item),
+                None if self.step == Step::ToStart => Next::End,
+                None => self.items.next(),
+            };
+            let is_of_way = self.pushed < self.way.len();
+            match next {
+                Next::Wait => return Ok(()),
+                Next::Item(item) if self.skips > 0 => {
+                    connection.skip(item);
+                    self.skips -= 1;
+                    self.items.advance();
+                    continue;
+                }
+                Next::Item(item) => {
+                    if let Some((found, has)) =
+                        has.and_then(|has| Some((self.outputs.check(item, has)?, has)))
+                    {
+                        return Err(self.lacks_output(found, has));
+                    }
+                    if !connection.push(Some(item)).map_err(BoardError::Push)? {
+                        return Ok(());
+                    }
+                    self.outputs.pass(item);
+                }
+                Next::End => {
+                    if !connection.push(None).map_err(BoardError::Push)? {
+                        return Ok(());
+                    }
+                    self.is_ended = true;
+                }
+            }
+            self.pushed += 1;
+            if !is_of_way && !self.is_ended {
+                self.items.advance();
+            }
+        }
+        Ok(())
+    }
+
+    fn lacks_output(&self, found: &'static str, has: BoardOutputs) -> BoardError {
+        let line = self.of_job(self.pushed as u32).and_then(|item| self.items.line_of(item));
+        BoardError::Outputs { program: self.items.name().to_owned(), line: line.unwrap_or(0), found, has }
     }
 
     /// All is driven.
@@ -368,7 +447,7 @@ impl<'a, const M: usize> Sender<'a, M> {
 
     /// The program line of an item of the program under way, in words.
     fn line_at(&self, item: u32) -> String {
-        let line = self.of_job(item).and_then(|item| self.job.line_of(item));
+        let line = self.of_job(item).and_then(|item| self.items.line_of(item));
         line.map_or_else(String::new, |line| format!(", at line {line} of the program"))
     }
 }
@@ -400,23 +479,48 @@ pub fn check_outputs<const M: usize>(
     job: &Job<M>,
     has: BoardOutputs,
 ) -> Result<(), BoardError> {
-    let mut speed_rpm = None;
+    let mut check = OutputCheck::default();
     for (number, item) in (0_u32..).zip(job.begin.lead.iter().chain(&job.items)) {
-        let Item::Switch(to) = item else { continue };
-        let found = match has {
-            BoardOutputs::CommandedSpeed => continue,
-            BoardOutputs::None => "spindle or coolant",
-            BoardOutputs::FixedSpeed if to.spindle == Spindle::Counterclockwise => "M4",
-            BoardOutputs::FixedSpeed
-                if to.spindle_turns() && *speed_rpm.get_or_insert(to.speed_rpm) != to.speed_rpm =>
-            {
-                "a second speed of the spindle"
-            }
-            BoardOutputs::FixedSpeed => continue,
-        };
-        let number = number.saturating_sub(job.begin.lead.len() as u32);
-        let (program, line) = (program.to_owned(), job.line_of(number).unwrap_or(0));
-        return Err(BoardError::Outputs { program, line, found, has });
+        if let Some(found) = check.check(item, has) {
+            let number = number.saturating_sub(job.begin.lead.len() as u32);
+            let (program, line) = (program.to_owned(), job.line_of(number).unwrap_or(0));
+            return Err(BoardError::Outputs { program, line, found, has });
+        }
+        check.pass(item);
     }
     Ok(())
+}
+
+/// Whether a board has the outputs that items switch, one after the other.
+#[derive(Clone, Copy, Debug, Default)]
+struct OutputCheck {
+    /// The speed with which the spindle was switched on first.
+    speed_rpm: Option<f64>,
+}
+
+impl OutputCheck {
+    /// What the next item switches, if there is no output for it.
+    fn check<const M: usize>(self, item: &Item<M>, has: BoardOutputs) -> Option<&'static str> {
+        let Item::Switch(to) = item else { return None };
+        match has {
+            BoardOutputs::CommandedSpeed => None,
+            BoardOutputs::None => Some("spindle or coolant"),
+            BoardOutputs::FixedSpeed if to.spindle == Spindle::Counterclockwise => Some("M4"),
+            BoardOutputs::FixedSpeed
+                if to.spindle_turns()
+                    && self.speed_rpm.is_some_and(|speed_rpm| speed_rpm != to.speed_rpm) =>
+            {
+                Some("a second speed of the spindle")
+            }
+            BoardOutputs::FixedSpeed => None,
+        }
+    }
+
+    fn pass<const M: usize>(&mut self, item: &Item<M>) {
+        if let Item::Switch(to) = item
+            && to.spindle_turns()
+        {
+            self.speed_rpm.get_or_insert(to.speed_rpm);
+        }
+    }
 }

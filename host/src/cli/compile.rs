@@ -88,7 +88,7 @@ fn compile_for<const N: usize>(
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
     if !arguments.no_spindle {
-        require_outputs(source_name, program, machine)?;
+        require_outputs(source_name, &program.steps, machine)?;
     }
     let plan = plan_program(source_name, program, machine, mode)?;
     if let Some(probe) = plan.probes.first() {

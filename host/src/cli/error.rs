@@ -216,6 +216,9 @@ pub enum CliError {
         /// Why.
         source: BoardError,
     },
+    /// A program that is planned while it is driven can't be read or planned to its end.
+    #[error("{0}; what was before that line is driven")]
+    Program(Box<dyn std::error::Error + Send + Sync>),
     /// A board can't take connections there.
     #[error("--listen {address}: found {source}, expected an address of this computer that is free")]
     Listen {

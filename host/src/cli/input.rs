@@ -102,7 +102,8 @@ impl Source {
         gcode::refusals(&self.name, &self.text, &self.options(options))
     }
 
-    fn options(&self, options: &ReadOptions) -> ReadOptions {
+    /// These options, with its own folder.
+    pub(super) fn options(&self, options: &ReadOptions) -> ReadOptions {
         let mut options = options.clone();
         options.subroutines.extend(self.folder.clone());
         options

@@ -58,6 +58,7 @@ pub use error::{Place, PlanningError, Problem};
 pub use executable::Executable;
 pub use outputs::require_outputs;
 pub use profile::PlacedRamp;
+pub(crate) use program::{assumed_path, notes};
 pub use program::{plan_moves, plan_program};
 pub(crate) use rest::rest_of_stretch;
 pub use spline::plan_spline;

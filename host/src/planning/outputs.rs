@@ -7,7 +7,7 @@
 use motion_kernel::hal::{OutputState, Spindle};
 
 use super::error::{PlanningError, Problem};
-use crate::gcode::{NoticeKind, Outputs, Program, SpindleSpeed, StepKind};
+use crate::gcode::{NoticeKind, Outputs, SpindleSpeed, Step, StepKind};
 use crate::machine::{Machine, SpindleSettings};
 
 /// The outputs as the program has switched them so far.
@@ -75,10 +75,10 @@ pub(super) fn acts_on<const N: usize>(machine: &Machine<N>, kind: NoticeKind) ->
 /// The first such word, with its line.
 pub fn require_outputs<const N: usize>(
     source_name: &str,
-    program: &Program,
+    steps: &[Step],
     machine: &Machine<N>,
 ) -> Result<(), PlanningError> {
-    for step in &program.steps {
+    for step in steps {
         let StepKind::Switch(to) = &step.kind else { continue };
         let spindle = match to.spindle {
             Spindle::Off => None,

@@ -33,8 +33,8 @@ pub fn plan_program<const N: usize>(
     };
     let machine = &driven(machine, mode);
     let mut plan = Plan::empty(source_name, machine.path.pulse, machine.tick_s, machine.letters_by_place());
-    plan.notices = program.notes(|kind| acts_on(machine, kind));
-    plan.notices.extend(assumed_path(program, machine));
+    plan.notices = notes(program, machine);
+    plan.notices.extend(assumed_path(&program.steps, machine));
     let (mut pipeline, mut gathered) = (Pipeline::new(machine, mode), Gathered::new(plan));
     let mut out = |next| gathered.take(next);
     pipeline
@@ -131,10 +131,15 @@ impl<const N: usize> Gathered<N> {
     }
 }
 
+/// What a program says, and what the machine does not act on.
+pub(crate) fn notes<const N: usize>(program: &Program, machine: &Machine<N>) -> Vec<String> {
+    program.notes(|kind| acts_on(machine, kind))
+}
+
 /// What is assumed of moves before any path mode is programmed, if there are such moves.
-fn assumed_path<const N: usize>(program: &Program, machine: &Machine<N>) -> Option<String> {
+pub(crate) fn assumed_path<const N: usize>(steps: &[Step], machine: &Machine<N>) -> Option<String> {
     let is_assumed = |step: &&Step| step.kind.mode() == Some(PathMode::Unprogrammed);
-    let line = program.steps.iter().find(is_assumed)?.line;
+    let line = steps.iter().find(is_assumed)?.line;
     let path = match machine.path.mode {
         DefaultPathMode::Exact => "exact path (G61)".to_owned(),
         DefaultPathMode::Blend => format!("G64 P{}", machine.path.blend_tolerance_mm),

@@ -84,6 +84,34 @@ fn a_program_is_sent_and_the_board_watched() {
     assert!(error.contains("found a board with the machine"), "{error}");
 }
 
+/// A program that is driven while it is read, with a stop and its words; a line at fault ends it at rest before that line.
+#[test]
+fn a_program_is_driven_while_it_is_read() {
+    let workspace = Workspace::new("stream");
+    let lines: String = (1..=400).map(|line| format!("G1 X{}\n", 0.05 * f64::from(line))).collect();
+    let text = format!("G21 G90 F6000\n{lines}G1 X3 Y1\n(MSG,turn it)\nM0\nG1 X2.5 Y0\n");
+    workspace.put("wrong.ngc", &format!("{text}G1 X5 Q\nG1 X90\nM2\n"));
+    let board = Board::start(&workspace);
+    let send = ["send", "wrong.ngc", "--port", &board.1, "--enable", "--stream"];
+    let (status, out, error) = outcome(&mut workspace.command(&send));
+    assert_eq!(status, Some(3), "{out} {error}");
+    let stop = "program: program stop at X 3.000 Y 1.000 Z 0.000: line 404 stops; turn it; r goes on";
+    assert!(out.contains(stop), "{out}");
+    workspace.put("wrong.ngc", &format!("{}G1 X5 Q\nG1 X90\nM2\n", text.replace("M0\n", "")));
+    let (status, out, error) = outcome(workspace.command(&send).args(["--restart", "--json"]));
+    assert_eq!(status, Some(2), "{out} {error}");
+    assert!(
+        error.contains("wrong.ngc:405:") && error.contains("what was before that line is driven"),
+        "{error}"
+    );
+    let last: Value = serde_json::from_str(out.lines().last().expect("a line")).expect("JSON");
+    assert_eq!(last["items"], Value::Null);
+    let (_, out, _) =
+        outcome(&mut workspace.command(&["watch", "--port", &board.1, "--seconds", "0.5", "--json"]));
+    let seen: Value = serde_json::from_str(out.lines().next().expect("a line")).expect("JSON");
+    assert_eq!((number(&seen["set_mm"][0]), number(&seen["set_mm"][1])), (2.5, 0.0), "{seen}");
+}
+
 /// A hold before the start, typed; a resume; an abort in the program.
 #[test]
 fn keys_hold_resume_and_abort() {
@@ -223,7 +251,7 @@ fn a_program_is_gone_on_with_after_power_cuts() {
     let quiet = |command: &mut Command| {
         command.stdin(Stdio::piped()).stdout(Stdio::null()).spawn().expect("a process")
     };
-    cut(&mut quiet(&mut send(&board.1, "part.journal")), 4);
+    cut(&mut quiet(send(&board.1, "part.journal").arg("--stream")), 4);
     // Another program, though by one figure.
     workspace.put("part.ngc", &part.replace("X60", "X61"));
     let (status, _, error) = resume(&board.1, &["--yes"]);

@@ -27,12 +27,13 @@ use super::error::{CliError, Outcome};
 use super::input;
 use super::port::PortArguments;
 use crate::board::from_line::from_line;
+use crate::board::items::{Said, Source};
 use crate::board::progress::{Place, Progress};
 use crate::board::sender::{Found, Permissions, check, check_outputs};
-use crate::board::{BoardError, Connection, Heard, Job, Port, Sender, Step};
+use crate::board::{BoardError, Connection, Heard, InPlanning, Job, Port, Sender, Step};
 use crate::files::STANDARD_INPUT;
 use crate::files::interrupt::{self, Asked};
-use crate::gcode::Program;
+use crate::gcode::{self, Program, ReadOptions};
 use crate::machine::{Machine, on_machine};
 use crate::planning::{
     Executable, Mode as PlanMode, Plan, PlanningError, on_axis_count, plan_program, require_outputs,
@@ -106,6 +107,10 @@ pub struct SendArguments {
     /// Give up what the board has of a program.
     #[arg(long)]
     restart: bool,
+    /// Begin at once: the program is read and planned while it is driven. A line at fault ends the motion at rest before it.
+    /// Without this, all of it is planned before anything moves.
+    #[arg(long, conflicts_with = "from_line")]
+    stream: bool,
     /// Leave out the words of spindle and coolant that the machine has no output for.
     #[arg(long)]
     no_spindle: bool,
@@ -131,11 +136,22 @@ fn send_program(
 ) -> Result<Outcome, CliError> {
     let machine = input::any_machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
-    let program = arguments.reading.program(&source, machine.read_options())?;
-    let program = Sent { arguments, resumed, program: &program, sum: Checksum::of(&source.text) };
+    let options = source.options(&arguments.reading.options(machine.read_options())?);
+    let name = input_sum(&source.text, &options);
+    if arguments.stream {
+        let source = Source {
+            name: source.name,
+            text: source.text,
+            options,
+            leaves_out_outputs: arguments.no_spindle,
+        };
+        return on_machine!(machine, machine => stream(arguments, (source, name), machine, out));
+    }
+    let program = gcode::read_with(&source.name, &source.text, &options)?;
+    let program = Sent { arguments, resumed, program: &program, sum: Checksum::of(&source.text), name };
     on_machine!(machine, machine => {
         if !arguments.no_spindle {
-            require_outputs(&source.name, program.program, machine)?;
+            require_outputs(&source.name, &program.program.steps, machine)?;
         }
         let plan = plan_program(&source.name, program.program, machine, PlanMode::Spanning)?;
         if let Some(probe) = plan.probes.first() {
@@ -153,8 +169,92 @@ struct Sent<'a> {
     arguments: &'a SendArguments,
     resumed: Option<&'a Resumed>,
     program: &'a Program,
-    /// The checksum of its file.
+    /// The checksum of its file, and of everything that its items are made of but the machine.
     sum: u32,
+    name: u32,
+}
+
+/// The checksum of a program and of what it is read with.
+fn input_sum(text: &[u8], options: &ReadOptions) -> u32 {
+    // Folders may have been named otherwise.
+    let options = ReadOptions { subroutines: Vec::new(), ..options.clone() };
+    let options = format!("{} {options:?}", env!("CARGO_PKG_VERSION"));
+    Checksum::of([Checksum::of(text), Checksum::of(options.as_bytes())].map(u32::to_le_bytes).as_flattened())
+}
+
+/// The name on the link of a program with this checksum that is planned while it is driven.
+pub(super) fn job_name(input: u32, machine: u32) -> u32 {
+    Checksum::of([input, machine].map(u32::to_le_bytes).as_flattened()).max(1)
+}
+
+/// Drives a program that is read and planned meanwhile.
+fn stream<const N: usize>(
+    arguments: &SendArguments,
+    (source, name): (Source, u32),
+    machine: &Machine<N>,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
+    let port = &arguments.port;
+    if port.port == Port::Simulator {
+        let (mut connection, _board) = port.simulated(machine)?;
+        greet(&mut connection).map_err(|error| port.refused(error))?;
+        return stream_job::<f32, N, N>(arguments, (source, name), machine, connection, out);
+    }
+    on_axis_count!(machine.axis_count(), M => {
+        let mut connection = port.open::<M>()?;
+        greet(&mut connection).map_err(|error| port.refused(error))?;
+        if connection.identity().is_some_and(|identity| identity.is_fixed_point) {
+            return stream_job::<Fixed, N, M>(arguments, (source, name), machine, connection, out);
+        }
+        stream_job::<f32, N, M>(arguments, (source, name), machine, connection, out)
+    })
+}
+
+fn stream_job<R: Root + Send, const N: usize, const M: usize>(
+    arguments: &SendArguments,
+    (source, name): (Source, u32),
+    machine: &Machine<N>,
+    connection: Connection<M>,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
+    holds_axes::<R, N>(machine)?;
+    let job = Job::<M>::in_planning(machine, 0);
+    let job = Job { name: job_name(name, job.machine), ..job };
+    let subject = Subject {
+        program_sum: Checksum::of(&source.text),
+        machine_sum: job.machine,
+        job: job.name,
+        session: connection.session(),
+        name: job.name,
+    };
+    let journal = Journal::open(arguments, &subject)?;
+    let lines = source.text.iter().filter(|&&byte| byte == b'\n').count() as u64;
+    let planned = InPlanning::begin::<R, N>(source, machine);
+    let driven = Driven {
+        job: &job,
+        planned: Some(planned),
+        found: found(arguments),
+        stops: Stops::default(),
+        middle: None,
+        journal,
+        lines,
+    };
+    drive(arguments, driven, machine, connection, out)
+}
+
+/// What is to become of a program that the board has already.
+fn found(arguments: &SendArguments) -> Found {
+    match (arguments.continues, arguments.restart) {
+        (true, _) => Found::Continued,
+        (_, true) => Found::GivenUp,
+        _ => Found::Stays,
+    }
+}
+
+/// Refuses a machine whose axes a kernel of the number type does not hold.
+fn holds_axes<R: Root, const N: usize>(machine: &Machine<N>) -> Result<(), CliError> {
+    let axes = machine.axes_config::<R>();
+    axes.map(|_| ()).map_err(|source| CliError::Axis { machine: machine.name.clone(), source })
 }
 
 fn send_plan<const N: usize>(
@@ -188,7 +288,7 @@ fn job<R: Root, const N: usize, const M: usize>(
     plan: &Plan<N>,
     machine: &Machine<N>,
 ) -> Result<Job<M>, CliError> {
-    machine.axes_config::<R>().map_err(|source| CliError::Axis { machine: machine.name.clone(), source })?;
+    holds_axes::<R, N>(machine)?;
     Ok(Job::new(machine, &Executable::new::<R>(plan)?.items))
 }
 
@@ -200,12 +300,8 @@ fn send_job<R: Root, const N: usize, const M: usize>(
     connection: Connection<M>,
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
-    let &Sent { arguments, resumed, program, sum } = sent;
-    let mut found = match (arguments.continues, arguments.restart) {
-        (true, _) => Found::Continued,
-        (_, true) => Found::GivenUp,
-        _ => Found::Stays,
-    };
+    let &Sent { arguments, resumed, program, sum, name } = sent;
+    let mut found = found(arguments);
     // Another machine is refused before another program.
     if let (Some(_), Some(identity)) = (resumed, connection.identity()) {
         check(&whole, identity).map_err(|error| arguments.port.refused(error))?;
@@ -218,7 +314,7 @@ fn send_job<R: Root, const N: usize, const M: usize>(
             if resumed.is_of(connection.controls().program) {
                 found = Found::GivenUp;
             }
-            let (job, middle) = resumed.rest::<R, M>(program, &whole, arguments.yes, &connection)?;
+            let (job, middle) = resumed.rest::<R, M>(program, (&whole, name), arguments.yes, &connection)?;
             (job, Some(middle))
         }
         (None, Some(line)) => {
@@ -236,17 +332,23 @@ fn send_job<R: Root, const N: usize, const M: usize>(
     };
     let journal = Journal::open(arguments, &subject)?;
     let stops = stops.skip(job.begin.stops);
-    drive(arguments, Driven { job: &job, found, stops, middle, journal }, machine, connection, out)
+    let lines = program.steps.last().map_or(0, |step| u64::from(step.line));
+    let driven = Driven { job: &job, planned: None, found, stops, middle, journal, lines };
+    drive(arguments, driven, machine, connection, out)
 }
 
 /// What is driven, and what goes with it.
 struct Driven<'a, const M: usize> {
     job: &'a Job<M>,
+    /// Its items, where they are planned meanwhile.
+    planned: Option<InPlanning<M>>,
     found: Found,
     stops: Stops,
     /// It begins in the middle.
     middle: Option<Middle>,
     journal: Option<Journal>,
+    /// Lines of the program.
+    lines: u64,
 }
 
 /// The job from a line on, and what there is to confirm.
@@ -331,16 +433,23 @@ fn drive<const N: usize, const M: usize>(
     mut connection: Connection<M>,
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
-    let refused = |error: BoardError| arguments.port.refused(error);
+    let refused = |error: BoardError| match error {
+        BoardError::Program(error) => CliError::Program(error),
+        error => arguments.port.refused(error),
+    };
     let names: Vec<String> = machine.driven_axes().iter().map(|axis| axis.name.clone()).collect();
-    let Driven { job, found, stops, middle, mut journal } = driven;
+    let Driven { job, planned, found, stops, middle, mut journal, lines } = driven;
     let may = Permissions {
         enables: arguments.enable,
         clears_fault: arguments.clear_fault,
         disables: arguments.disable,
         found,
     };
-    let mut sender = Sender::new(job, &names, may);
+    let items = planned.is_none().then_some(job.items.len());
+    let mut sender = match planned {
+        Some(planned) => Sender::planned(job, planned, &names, may),
+        None => Sender::new(job, &names, may),
+    };
     let mut progress = Progress::new(job.begin.path, job.header.tick_s);
     if let Some(identity) = connection.identity() {
         check(job, identity).map_err(refused)?;
@@ -348,7 +457,7 @@ fn drive<const N: usize, const M: usize>(
         check_outputs(&program, job, identity.outputs).map_err(refused)?;
     }
     let keys = keys(arguments);
-    let mut shown = Shown::new(arguments, &names, stops, job.items.len() as u64);
+    let mut shown = Shown::new(arguments, &names, stops, (items, lines));
     if let Some(middle) = &middle
         && let Some(outcome) = middle.confirm(job, &mut connection, &keys, &shown, out)?
     {
@@ -395,6 +504,12 @@ fn drive<const N: usize, const M: usize>(
             }
         }
         let step = sender.advance(&mut connection).map_err(refused)?;
+        for said in sender.take_said() {
+            match said {
+                Said::Stop(place, text) => shown.stops.add(place, text),
+                Said::Note(note) => shown.say(out, &format!("note: {note}"))?,
+            }
+        }
         shown.show(out, step, &connection)?;
         if let Some(journal) = &mut journal {
             note(journal, &mut progress, &sender, &connection, names.len());

@@ -10,7 +10,7 @@ use thiserror::Error;
 
 use super::confirm::Middle;
 use super::journal::{Record, default_path};
-use super::{SendArguments, send_program};
+use super::{SendArguments, job_name, send_program};
 use crate::board::{Connection, Job};
 use crate::cli::error::{CliError, Outcome};
 use crate::cli::input;
@@ -139,6 +139,7 @@ pub fn resume(arguments: &ResumeArguments, out: &mut dyn Write) -> Result<Outcom
         machine: record.machine.clone(),
         reading: record.reading.clone(),
         from_line: None,
+        stream: false,
         yes,
         enable,
         clear_fault,
@@ -162,11 +163,11 @@ impl Resumed {
         [self.record.job, self.record.name].contains(&program)
     }
 
-    /// What is left of the whole `job`, if that is the one of before, on a board that knows where the machine is.
+    /// What is left of the whole `job`, which is made of what has the checksum `input`, if that is the one of before, on a board that knows where the machine is.
     pub(super) fn rest<R: Root, const M: usize>(
         &self,
         program: &Program,
-        job: &Job<M>,
+        (job, input): (&Job<M>, u32),
         is_confirmed: bool,
         connection: &Connection<M>,
     ) -> Result<(Job<M>, Middle), CliError> {
@@ -175,7 +176,8 @@ impl Resumed {
         if found != expected {
             return Err(self.refused(ResumeError::Machine { found, expected }));
         }
-        if job.name != record.job {
+        // It may have been planned while it was driven.
+        if ![job.name, job_name(input, job.machine)].contains(&record.job) {
             return Err(self.refused(ResumeError::Items));
         }
         if !self.is_homed && (record.session.is_none() || connection.session() != record.session) {

@@ -17,21 +17,30 @@ pub(super) struct Shown<'a> {
     axes: &'a [String],
     is_json: bool,
     bar: ProgressBar,
-    stops: Stops,
+    pub(super) stops: Stops,
+    /// Items of the program, where that is known.
+    items: Option<usize>,
     last: Option<(Step, Option<State>)>,
     told: Instant,
 }
 
 impl<'a> Shown<'a> {
-    pub(super) fn new(arguments: &SendArguments, axes: &'a [String], stops: Stops, items: u64) -> Self {
+    /// `of` is how many items and lines the program has.
+    pub(super) fn new(
+        arguments: &SendArguments,
+        axes: &'a [String],
+        stops: Stops,
+        of: (Option<usize>, u64),
+    ) -> Self {
+        let (items, lines) = of;
         let is_shown = io::stderr().is_terminal() && !arguments.json;
         let target = if is_shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let bar = ProgressBar::with_draw_target(Some(items), target);
+        let bar = ProgressBar::with_draw_target(Some(lines), target);
         // A template that does not parse would only change the look of the bar.
         if let Ok(style) = ProgressStyle::with_template("{bar:24} {percent:>3} %  {msg}") {
             bar.set_style(style);
         }
-        Self { axes, is_json: arguments.json, bar, stops, last: None, told: Instant::now() }
+        Self { axes, is_json: arguments.json, bar, stops, items, last: None, told: Instant::now() }
     }
 
     /// A line.
@@ -80,8 +89,8 @@ impl<'a> Shown<'a> {
             return writeln!(out, "{line}").and_then(|()| out.flush()).map_err(CliError::Output);
         }
         let Some(status) = status else { return Ok(()) };
-        if step == Step::Drives {
-            self.bar.set_position(u64::from(status.taken));
+        if step == Step::Drives && status.line > 0 {
+            self.bar.set_position(u64::from(status.line));
         }
         let position = at(self.axes, &status.set);
         let percent = f64::from(connection.controls().override_permille) * 0.1;
@@ -124,7 +133,7 @@ impl<'a> Shown<'a> {
             "feed_mm_s": status.map(|status| status.feed_mm_s),
             "override": f64::from(connection.controls().override_permille) * 1e-3,
             "taken": status.map(|status| status.taken),
-            "items": self.bar.length(),
+            "items": self.items,
         })
     }
 }

@@ -8,6 +8,7 @@ use crate::gcode::{Program, StepKind};
 use crate::planning::{Item as PlanItem, Plan};
 
 /// Places of program stops, in their order, with what the program says of them.
+#[derive(Default)]
 pub(super) struct Stops {
     places: Vec<(Vec<Position>, String)>,
     /// Those before were reached.
@@ -43,6 +44,11 @@ impl Stops {
     /// Without the first ones.
     pub(super) fn skip(self, count: usize) -> Self {
         Self { next: count, ..self }
+    }
+
+    /// The next stop is known.
+    pub(super) fn add(&mut self, place: Vec<Position>, text: String) {
+        self.places.push((place, text));
     }
 
     /// What is said of the stop at `set`, the next one there.
