@@ -65,9 +65,8 @@ impl<const N: usize, const M: usize> Jogs<'_, N, M> {
             }
             // What the board has before the greeting is not this one's to give up.
             if !matches!(sender.step(), Step::Greets | Step::Aborts) {
-                let is_due = |seen: &Seen<M>, status| {
-                    press.release.is_some_and(|ticks| seen.ticks(status) >= ticks)
-                };
+                let is_due =
+                    |seen: &Seen<M>, status| press.release.is_some_and(|ticks| seen.ticks(status) >= ticks);
                 let moving = connection.status().filter(|status| status.state == State::Moving);
                 let is_due = seen.as_ref().zip(moving).is_some_and(|(seen, status)| is_due(seen, status));
                 // Before it moves, too.

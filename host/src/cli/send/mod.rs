@@ -350,7 +350,7 @@ fn drive<const N: usize, const M: usize>(
     let keys = keys(arguments);
     let mut shown = Shown::new(arguments, &names, stops, job.items.len() as u64);
     if let Some(middle) = &middle
-        && let Some(outcome) = middle.confirm(job, &mut connection, &keys, &shown, out)?
+        && let Some(outcome) = middle.confirm(job, (&mut connection, &arguments.port), &keys, &shown, out)?
     {
         return Ok(outcome);
     }
