@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use motion_host::board::items::{InPlanning, Source};
 use motion_host::board::job::parameters;
+use motion_host::board::jog::Jogs;
 use motion_host::board::parameters::{Figures, read, write};
 use motion_host::board::sender::{Found, Permissions};
 use motion_host::board::simulator::{self, SimulatedBoard};
@@ -17,6 +18,7 @@ use motion_host::board::{BoardError, Connection, Heard, Job, Port, Sender, Step}
 use motion_host::gcode::ReadOptions;
 use motion_host::machine::Machine;
 use motion_host::planning::Executable;
+use motion_host::simulate::jog::{Ended, Keys, Press};
 use motion_kernel::link::{State, WriteError};
 use motion_kernel::program::Item;
 use motion_kernel::units::Position;
@@ -459,4 +461,65 @@ fn a_board_gets_other_parameters() {
     let refused = write(&mut connection, &first);
     assert!(matches!(refused, Err(BoardError::Parameters(WriteError::DrivesOn))), "{refused:?}");
     assert_eq!(drive(&job, ENABLES, &mut connection, |_, _, _| false).expect("driven"), Step::Done);
+}
+
+/// Keys on a board: one goes its way, one is released; where the cable is out, the board comes to rest by itself, and the next
+/// key begins there.
+#[test]
+fn a_jog_ends_by_itself_by_its_release_or_by_the_dead_man() {
+    /// Of the board's time; ten times the pauses of a slow computer.
+    const DEAD_MAN_MS: u16 = 5000;
+    const FEED_MM_S: f64 = 20.0;
+    let machine = Machine::reference();
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = listener.local_addr().expect("bound");
+    let _board = simulator::listen(&machine, 30, listener, 5.0).expect("a board");
+    let presses = ["Y+3", "X+400@2000", "X+400", "X-1"].map(|press| press.parse::<Press>().expect("a press"));
+    let keys = Keys::new(&machine, &presses, Some(FEED_MM_S)).expect("keys");
+    let (job, axes) = (Job::<3>::new(&machine, &[]), ["X", "Y", "Z"].map(str::to_owned));
+    let jogs = Jogs { keys: &keys, job: &job, axes: &axes, may: ENABLES, dead_man_ms: DEAD_MAN_MS };
+    let cable = Cable::to(address);
+    let mut connection = connect(cable.address, 30);
+    let first = jogs.press(0, &mut connection, &mut || false).expect("a jog");
+    assert_eq!((first.from_mm, first.to_mm, first.ended), (0.0, 3.0, Ended::Distance));
+    assert!(first.feed_mm_s > 0.5 * FEED_MM_S && first.feed_mm_s < FEED_MM_S + 1e-3, "{first:?}");
+    assert_eq!(connection.controls().dead_man_ms, 0);
+    let second = jogs.press(1, &mut connection, &mut || false).expect("a jog");
+    assert!(matches!(second.ended, Ended::Released { .. }), "{second:?}");
+    assert!(second.to_mm > 5.0 && second.to_mm < 100.0, "{second:?}");
+    // By the operator.
+    let begin = Instant::now();
+    let released = jogs.press(2, &mut connection, &mut || begin.elapsed() > Duration::from_millis(500));
+    let released = released.expect("a jog");
+    assert!(released.from_mm == second.to_mm && released.to_mm < 400.0 + second.to_mm, "{released:?}");
+    // The cable is out.
+    let begin = Instant::now();
+    let lost = jogs.press(2, &mut connection, &mut || {
+        cable.cut(begin.elapsed() > Duration::from_millis(500));
+        false
+    });
+    assert!(matches!(lost, Err(BoardError::Wire(_))), "{lost:?}");
+    let cut_mm = stands_mm(&connection);
+    drop(connection);
+    thread::sleep(Duration::from_millis(2000));
+    cable.cut(false);
+    let mut connection = connect(cable.address, 31);
+    let begin = Instant::now();
+    let is_held =
+        |connection: &Connection<3>| connection.status().is_some_and(|status| status.state == State::Held);
+    while !is_held(&connection) {
+        assert!(begin.elapsed() < LONGEST, "{:?}", connection.status());
+        connection.step(Duration::from_millis(1), &mut |_| {});
+    }
+    let rest_mm = stands_mm(&connection);
+    // What was told last may be 0.1 s old, and a stop is shorter than 5 mm.
+    let most_mm = FEED_MM_S * (f64::from(DEAD_MAN_MS) * 1e-3 + 1.0) + 5.0;
+    assert!(rest_mm > cut_mm && rest_mm < cut_mm + most_mm, "{cut_mm} {rest_mm}");
+    let back = jogs.press(3, &mut connection, &mut || false).expect("a jog");
+    assert!(back.from_mm == rest_mm && (back.to_mm - rest_mm + 1.0).abs() < 1e-9, "{back:?}");
+}
+
+/// Where X stands, as told last \[mm\].
+fn stands_mm(connection: &Connection<3>) -> f64 {
+    stands(connection)[0].to_mm()
 }

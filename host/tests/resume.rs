@@ -2,8 +2,10 @@
 //! out. Boards run in step with the sender, tick by tick, so nothing depends on the clock.
 
 use std::collections::VecDeque;
+use std::convert::Infallible;
 use std::io;
 use std::sync::mpsc::{Receiver, Sender as Channel, channel};
+use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
@@ -13,12 +15,14 @@ use motion_host::board::progress::{Place, Progress};
 use motion_host::board::sender::{Found, Permissions};
 use motion_host::board::wire::Wire;
 use motion_host::board::{Connection, Heard, Job, Sender, Step};
-use motion_host::machine::Machine;
+use motion_host::machine::{CoolantSettings, Machine, SpindleSettings};
 use motion_host::planning::Executable;
 use motion_host::simulate::hardware::{SimulatedHardware, simulated};
 use motion_kernel::axis::Feedforward;
 use motion_kernel::flight::FlightRecorder;
-use motion_kernel::hal::{BoardOutputs, Encoder};
+use motion_kernel::hal::{
+    BoardOutputs, DriveEnable, Encoder, Inputs, MachineInputs, OutputState, Outputs, VelocityChannel,
+};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::law::PathMotion;
 use motion_kernel::link::{BoardLink, Event, FRAME_MAX, Identity, PROTOCOL};
@@ -26,12 +30,12 @@ use motion_kernel::live::Leads;
 use motion_kernel::path::Piece;
 use motion_kernel::program::{FORMAT, Item};
 use motion_kernel::queue::LiveStreams;
-use motion_kernel::units::Position;
+use motion_kernel::units::{Counts, DacCode, Position};
 use motion_tests::check::planned;
 use rtic_core::Exclusive;
 
-/// Power cuts in the test.
-const CUTS: u64 = 60;
+/// Programs with power cuts, one or two, on each of two machines.
+const CUTS: u64 = 30;
 /// Ticks of the board each time that the sender reads.
 const STEP_TICKS: u32 = 8;
 /// Of the board's clock in a tick, so that it tells its status in each.
@@ -44,6 +48,50 @@ impl Random {
     fn below(&mut self, count: u64) -> u64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 33) % count
+    }
+}
+
+/// What was switched, and in which tick.
+type Switched = Arc<Mutex<Vec<(u32, OutputState)>>>;
+
+/// The simulated machine, and what its spindle and coolant are switched to.
+struct Recorded<'a> {
+    machine: SimulatedHardware<'a, 3>,
+    now: u32,
+    switched: Switched,
+}
+
+impl Encoder<3> for Recorded<'_> {
+    type Error = Infallible;
+    fn latch(&mut self) -> Result<[Counts; 3], Infallible> {
+        self.machine.latch()
+    }
+}
+
+impl Inputs<3> for Recorded<'_> {
+    type Error = Infallible;
+    fn read_inputs(&mut self) -> Result<MachineInputs<3>, Infallible> {
+        self.machine.read_inputs()
+    }
+}
+
+impl<'a> VelocityChannel<3> for Recorded<'a> {
+    type Error = <SimulatedHardware<'a, 3> as VelocityChannel<3>>::Error;
+    fn write(&mut self, codes: &[DacCode; 3]) -> Result<(), Self::Error> {
+        self.machine.write(codes)
+    }
+}
+
+impl<'a> DriveEnable<3> for Recorded<'a> {
+    type Error = <SimulatedHardware<'a, 3> as DriveEnable<3>>::Error;
+    fn set_enabled(&mut self, enabled: bool) -> Result<(), Self::Error> {
+        self.machine.set_enabled(enabled)
+    }
+}
+
+impl Outputs for Recorded<'_> {
+    fn switch(&mut self, to: &OutputState) {
+        self.switched.lock().expect("one board").push((self.now, *to));
     }
 }
 
@@ -76,18 +124,18 @@ impl Wire for InStep {
 }
 
 /// A board from power-on, with the simulated machine at its origin, until its power is cut after so many ticks.
-fn board(machine: &Machine, session: u32, until: Option<u32>) -> InStep {
+fn board(machine: &Machine, session: u32, until: Option<u32>, switched: Switched) -> InStep {
     let (ask, asked) = channel::<Vec<u8>>();
     let (answer, answers) = channel();
     let machine = machine.clone();
-    thread::spawn(move || run(&machine, session, until, &asked, &answer));
+    thread::spawn(move || run(&machine, (session, until), switched, &asked, &answer));
     InStep { ask, answers, to_board: Vec::new(), waiting: VecDeque::new() }
 }
 
 fn run(
     machine: &Machine,
-    session: u32,
-    until: Option<u32>,
+    (session, until): (u32, Option<u32>),
+    switched: Switched,
     asked: &Receiver<Vec<u8>>,
     answer: &Channel<Vec<u8>>,
 ) {
@@ -113,7 +161,8 @@ fn run(
         machine: started.program.machine_checksum(),
     };
     let world = simulated(machine).expect("a machine");
-    let mut hardware = SimulatedHardware::new(&world).expect("converters");
+    let hardware = SimulatedHardware::new(&world).expect("converters");
+    let mut hardware = Recorded { machine: hardware, now: 0, switched };
     let mut flight = FlightRecorder::<f32, 3, 16, 8>::new();
     let mut streams = LiveStreams::<f32, 3, 64, 16>::new();
     let (feeder, intake) = streams.split(header.rules, header.start);
@@ -129,6 +178,7 @@ fn run(
             if until == Some(ticks) {
                 return;
             }
+            hardware.now = ticks + 1;
             control.tick(None, None, &mut hardware);
             world.advance();
             ticks += 1;
@@ -150,6 +200,7 @@ fn run(
 
 /// What was told of a tick of the program.
 struct Told {
+    tick: u32,
     driven: u32,
     /// That the machine has followed to.
     sure: u32,
@@ -166,7 +217,8 @@ fn drive(
     until: Option<u32>,
     random: &mut Random,
 ) -> (Vec<Told>, u32) {
-    let mut wire = Some(board(machine, session, until));
+    let switched = Switched::default();
+    let mut wire = Some(board(machine, session, until, Arc::clone(&switched)));
     let open = Box::new(move || match wire.take() {
         Some(wire) => Ok(Box::new(wire) as Box<dyn Wire>),
         None => Err(io::ErrorKind::BrokenPipe.into()),
@@ -187,19 +239,43 @@ fn drive(
                 Heard::Board(Event::Status(status)) if status.aborts == connection.controls().aborts => {
                     let Some(driven) = sender.driven(&status) else { continue };
                     let sure = progress.tell(status.tick, Place { driven, line: status.line }).driven;
-                    told.push(Told { driven, sure, set: status.set, actual: status.actual });
+                    told.push(Told {
+                        tick: status.tick,
+                        driven,
+                        sure,
+                        set: status.set,
+                        actual: status.actual,
+                    });
                     if random.below(period) == 0 {
                         journal = sure;
                     }
                 }
-                Heard::Lost(_) => return (told, journal),
+                Heard::Lost(_) => {
+                    check_outputs(job, &told, &switched, false);
+                    return (told, journal);
+                }
                 _ => {}
             }
         }
         if sender.advance(&mut connection).expect("no fault") == Step::Done {
+            check_outputs(job, &told, &switched, true);
             return (told, journal);
         }
     }
+}
+
+/// Spindle and coolant of a job that begins in the middle are on before anything moves, the way to its path too, and stay so
+/// up to the program's end.
+fn check_outputs(job: &Job<3>, told: &[Told], switched: &Switched, is_whole: bool) {
+    let switched = switched.lock().expect("one board");
+    let (Some(Item::Switch(on)), Some(first)) = (job.begin.lead.first(), told.first()) else { return };
+    let moves = told.iter().find(|told| told.set != first.set).map(|told| told.tick);
+    let last = told.windows(2).rev().find(|two| two[0].set != two[1].set).map(|two| two[1].tick);
+    let (Some(moves), Some(last)) = (moves, last) else { return };
+    assert!(switched.first().is_some_and(|&(tick, to)| tick < moves && to == *on), "{switched:?} {moves}");
+    let off = switched.iter().find(|(_, to)| *to != *on);
+    assert!(off.is_none_or(|&(tick, _)| is_whole && tick >= last), "{switched:?} {last}");
+    assert!(!is_whole || off.is_some());
 }
 
 /// The path of a whole job.
@@ -326,14 +402,22 @@ fn program() -> String {
 #[test]
 fn after_a_power_cut_the_whole_path_is_driven() {
     let machine = lagging();
-    let whole = job(&program(), &machine);
+    power_cuts(&machine, &program());
+    let spindle = SpindleSettings { speed_max_rpm: 9000.0, start_s: 0.1, stop_s: 0.0, reverses: false };
+    let coolant = CoolantSettings { flood: true, mist: false };
+    let machine = Machine { spindle: Some(spindle), coolant: Some(coolant), ..machine };
+    power_cuts(&machine, &format!("M3 S6000\nM8\n{}", program()));
+}
+
+fn power_cuts(machine: &Machine, text: &str) {
+    let whole = job(text, machine);
     let path = Path::of(&whole);
     let end = whole.items.iter().rev().find_map(|item| match item {
         Item::EndOfStretch(end) => Some(*end),
         _ => None,
     });
     let mut random = Random(1);
-    let (told, _) = drive(&machine, &whole, 1, None, &mut random);
+    let (told, _) = drive(machine, &whole, 1, None, &mut random);
     let ticks = told.len() as u64;
     let [from_mm, to_mm] = covered(&path, &told, 0);
     assert!(from_mm == 0.0 && (to_mm - path.length_mm).abs() < NEAR_MM, "{to_mm}");
@@ -347,7 +431,7 @@ fn after_a_power_cut_the_whole_path_is_driven() {
             // Before the program begins, too, and behind its end.
             let until = (cuts < 1 + seed % 2).then(|| 200 + random.below(ticks * 11 / 10) as u32);
             let begin = job.begin.path as usize;
-            let (told, journal) = drive(&machine, &job, session, until, &mut random);
+            let (told, journal) = drive(machine, &job, session, until, &mut random);
             let [from_mm, to_mm] = covered(&path, &told, begin);
             // Nothing is left out between two runs.
             assert!(from_mm <= driven_mm, "seed {seed}: from {driven_mm} mm to {from_mm} mm");

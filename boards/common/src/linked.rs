@@ -366,6 +366,8 @@ mod tests {
         unhealthy: Option<FaultKind<f32>>,
         /// The board's own hold.
         is_held: bool,
+        /// Nothing comes from the operator any more.
+        is_silent: bool,
     }
 
     impl Operator {
@@ -412,6 +414,7 @@ mod tests {
             is_ready: false,
             unhealthy: None,
             is_held: false,
+            is_silent: false,
         };
         let (mut out, mut to_board) = ([0; FRAME_MAX], std::collections::VecDeque::new());
         let (mut states, mut lines): (Vec<(State, _)>, _) = (Vec::new(), Vec::new());
@@ -419,7 +422,7 @@ mod tests {
             if script(now, &mut operator) {
                 return Seen { states, drives, lines };
             }
-            let Operator { host, items, status, is_ready, unhealthy, is_held } = &mut operator;
+            let Operator { host, items, status, is_ready, unhealthy, is_held, is_silent } = &mut operator;
             while let Some(item) = items.front()
                 && *is_ready
                 && host.push(item.as_ref()).expect("short")
@@ -427,7 +430,7 @@ mod tests {
                 items.pop_front();
             }
             let now_ms = now / 2;
-            let length = host.transmit(now_ms, &mut out);
+            let length = if *is_silent { 0 } else { host.transmit(now_ms, &mut out) };
             to_board.extend(out[..length].iter().copied());
             drives.now = now;
             control.tick(*unhealthy, None, &mut drives);
@@ -686,6 +689,52 @@ mod tests {
             assert_eq!(names(&seen), [Off, Held, Moving, Held, Moving, Idle]);
             assert_eq!(seen.states.last().map(|(_, set)| *set), Some(end()));
         }
+    }
+
+    /// A dead man's time \[ms\], in ticks, and how often a PC says something at least.
+    const DEAD_MAN_MS: u16 = 250;
+    const DEAD_MAN_TICKS: u32 = 500;
+    const SAYS_TICKS: u32 = 200;
+
+    /// A PC falls silent: with a dead man the board holds within the time and the stop, and its position is known; it stays
+    /// there when the PC is back, until the next resume. Without one it drives what it has.
+    #[test]
+    fn a_dead_man_holds() {
+        const FROM: u32 = 2600;
+        let held_at = |dead_man_ms: u16, held_from: Option<u32>| {
+            let (mut step, mut held) = (0, None);
+            let seen = board(|now, operator| {
+                operator.is_held = held_from.is_some_and(|from| now >= from) && held.is_none();
+                operator.is_silent = held_from.is_none() && (FROM..FROM + 3000).contains(&now);
+                let before = step;
+                let is_over = drive(&mut step, operator);
+                if (before, step) == (1, 2) {
+                    assert!(operator.host.control(|controls| controls.dead_man_ms = dead_man_ms));
+                }
+                if now > FROM && operator.state() == Some(State::Held) {
+                    held.get_or_insert(now);
+                }
+                // Long after the PC is back.
+                if held.is_some() && now == FROM + 5000 {
+                    assert_eq!(operator.state(), Some(State::Held));
+                    assert!(operator.host.press(Mode::Run));
+                }
+                is_over
+            });
+            assert_eq!(seen.states.last().map(|(state, set)| (*state, *set)), Some((State::Idle, end())));
+            let rests = seen.states.iter().filter(|(state, _)| *state == State::Held).count();
+            // Before the start, and here.
+            assert_eq!(rests, 1 + usize::from(held.is_some()));
+            held
+        };
+        let latest = FROM + DEAD_MAN_TICKS;
+        let stop_ticks = held_at(0, Some(latest)).expect("held") - latest;
+        let held = held_at(DEAD_MAN_MS, None).expect("held");
+        assert!(
+            held > latest - SAYS_TICKS && held <= latest + 2 * stop_ticks,
+            "{held} {latest} {stop_ticks}"
+        );
+        assert_eq!(held_at(0, None), None);
     }
 
     const ON: OutputState =

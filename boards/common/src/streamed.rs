@@ -2,7 +2,7 @@
 //!
 //! Consumes the bytes of a PC's [`HostLink`](motion_kernel::link::HostLink); keeps the tick's streams filled with the items
 //! that come, obeys the operator's controls, and answers. Motion ends at rest on the path wherever items stop coming, so no
-//! time-out of the link decides about it. Background.
+//! time-out of the link decides about it but a dead man's, where the controls ask for one. Background.
 
 use core::cell::RefCell;
 use core::convert::Infallible;
@@ -96,7 +96,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
     ) -> Result<(), SupplyError<Infallible>> {
         let Self { link, feeder, control, .. } = self;
         let bytes = core::iter::from_fn(next_byte);
-        let is_held = is_hold_asked();
+        let is_held = is_hold_asked() || link.get_mut().is_silent();
         if is_held {
             control.hold();
         }

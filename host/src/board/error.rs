@@ -115,6 +115,9 @@ pub enum BoardError {
     /// There is no way to the program's start.
     #[error("found no way to the program's start: {0}")]
     NoWay(motion_kernel::straight::StraightError),
+    /// There is no such jog from where the machine stands.
+    #[error("found a jog {0}")]
+    Jog(motion_kernel::jog::JogError),
     /// The board was reset.
     #[error(
         "found a board that has started anew, expected it to go on: it had confirmed {confirmed} items{at}"
@@ -182,7 +185,8 @@ impl BoardError {
             | Self::Program(_)
             | Self::Interrupted { .. }
             | Self::Parameters(_)
-            | Self::NoWay(_) => true,
+            | Self::NoWay(_)
+            | Self::Jog(_) => true,
         }
     }
 }

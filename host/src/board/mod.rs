@@ -9,6 +9,7 @@
 //! - [`job`]: the items of a program for a board's axes, and its name;
 //! - [`from_line`]: where a job begins that is driven from a program's line on;
 //! - [`sender`]: drives a job, step by step;
+//! - [`jog`]: jogs of a machine on a board;
 //! - [`progress`]: how far a program is for sure;
 //! - [`parameters`]: a board's parameters, read, written and compared;
 //! - [`simulator`]: a board with a simulated machine, in a thread or behind an address;
@@ -22,6 +23,7 @@ pub mod items;
 pub mod job;
 pub mod from_line;
 pub mod sender;
+pub mod jog;
 pub mod progress;
 pub mod parameters;
 pub mod simulator;

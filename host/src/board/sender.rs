@@ -6,9 +6,11 @@
 use std::time::{Duration, Instant};
 
 use motion_kernel::hal::{BoardOutputs, Spindle};
+use motion_kernel::jog::{Jog, JogError};
 use motion_kernel::link::{Event, Identity, Mode, PROTOCOL, State, Status};
 use motion_kernel::program::{FORMAT, Item};
 use motion_kernel::straight::Straight;
+use motion_kernel::units::Position;
 
 use super::connection::{Connection, Heard};
 use super::error::{Agreement, BoardError};
@@ -73,6 +75,9 @@ pub enum Step {
     Aborted,
 }
 
+/// Makes a jog from where the machine stands.
+pub type MakeJog<'a, const M: usize> = &'a dyn Fn([Position; M]) -> Result<Jog<M>, JogError>;
+
 /// Drives a job.
 pub struct Sender<'a, const M: usize> {
     job: &'a Job<M>,
@@ -92,6 +97,8 @@ pub struct Sender<'a, const M: usize> {
     /// The way to the job's start, with what is switched before it. It is a program of its own, or the beginning of the job's
     /// where that has switched something: between two programs all is off.
     way: Vec<Item<M>>,
+    /// All there is to drive is a jog, with a dead man.
+    jog: Option<(MakeJog<'a, M>, u16)>,
     /// Items pushed of the program under way, its end among them.
     pushed: usize,
 }
@@ -122,6 +129,7 @@ impl<'a, const M: usize> Sender<'a, M> {
             since: Instant::now(),
             is_held: false,
             way: Vec::new(),
+            jog: None,
             pushed: 0,
         }
     }
@@ -129,6 +137,12 @@ impl<'a, const M: usize> Sender<'a, M> {
     /// What the program has said since the last call, where it is planned while it is driven.
     pub fn take_said(&mut self) -> Vec<Said> {
         self.items.take_said()
+    }
+
+    /// Drives a jog and nothing else, which is a way of its own. After a silence of `dead_man_ms` the board holds.
+    #[must_use]
+    pub fn jogs(self, jog: MakeJog<'a, M>, dead_man_ms: u16) -> Self {
+        Self { jog: Some((jog, dead_man_ms)), ..self }
     }
 
     /// How far it is.
@@ -318,6 +332,17 @@ impl<'a, const M: usize> Sender<'a, M> {
 
     /// The board is at rest and waits for a program.
     fn approach(&mut self, status: &Status<M>, connection: &mut Connection<M>) -> Result<(), BoardError> {
+        (self.pushed, self.is_ended) = (0, false);
+        if let Some((jog, dead_man_ms)) = self.jog {
+            self.way = jog(status.set)
+                .map_err(BoardError::Jog)?
+                .map(|item| item.unwrap_or_else(|never| match never {}))
+                .collect();
+            let _ = connection.command(|link| link.control(|controls| controls.dead_man_ms = dead_man_ms));
+            self.run(connection);
+            self.go(Step::ToStart);
+            return Ok(());
+        }
         let way: Straight<M> =
             motion_board::runs::to_start(&self.job.header, status.set).map_err(BoardError::NoWay)?;
         self.way = self.job.begin.lead.clone();
@@ -326,7 +351,6 @@ impl<'a, const M: usize> Sender<'a, M> {
             self.begin(connection);
             return Ok(());
         }
-        (self.pushed, self.is_ended) = (0, false);
         self.run(connection);
         self.go(Step::ToStart);
         Ok(())
@@ -366,7 +390,7 @@ impl<'a, const M: usize> Sender<'a, M> {
             return self.items.take_failure().map_or(Ok(()), Err);
         }
         if self.is_ended && connection.is_driven() {
-            if self.step == Step::ToStart {
+            if self.step == Step::ToStart && self.jog.is_none() {
                 self.way.clear();
                 self.begin(connection);
             } else {
@@ -390,6 +414,7 @@ impl<'a, const M: usize> Sender<'a, M> {
                 Next::Wait => return Ok(()),
                 Next::Item(item) if self.skips > 0 => {
                     connection.skip(item);
+                    self.outputs.pass(item);
                     self.skips -= 1;
                     self.items.advance();
                     continue;
@@ -427,6 +452,10 @@ impl<'a, const M: usize> Sender<'a, M> {
 
     /// All is driven.
     fn end(&mut self, connection: &mut Connection<M>) {
+        if self.jog.is_some() {
+            // At rest nothing is to be held.
+            let _ = connection.command(|link| link.control(|controls| controls.dead_man_ms = 0));
+        }
         if self.may.disables {
             let _ = connection.command(|link| link.enable(false));
             self.go(Step::Disables);

@@ -1,4 +1,4 @@
-//! `motion jog`: presses and releases jog keys of the simulated machine.
+//! `motion jog`: presses and releases jog keys of the simulated machine, or of one on a board.
 
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -8,11 +8,16 @@ use serde::Serialize;
 
 use super::error::{CliError, Outcome};
 use super::outputs::Outputs;
+use super::port::{OptionalPort, PortArguments};
 use super::table::{self, Align};
 use super::units::{InUnit, TableUnits};
-use super::{input, write_json};
-use crate::files::Files;
+use super::{input, send, write_json};
+use crate::board::jog::Jogs;
+use crate::board::sender::{Found, Permissions};
+use crate::board::{Connection, Job, Port};
+use crate::files::{Files, interrupt};
 use crate::machine::{Machine, on_machine};
+use crate::planning::on_axis_count;
 use crate::simulate::job::RunInfo;
 use crate::simulate::jog::{Ended, Jogged, Keys, Press};
 
@@ -23,13 +28,18 @@ Examples:
   motion jog X+ X- --machine mine.toml
                                       from one soft limit, [axis.travel], to the other
   motion jog X+20 --trace jog.csv     every tick, for a spreadsheet
+  motion jog X+20 --port /dev/ttyACM0 --feed 5
+                                      on a board; Ctrl-C releases the key
+
+A board holds by itself where nothing comes from this command for the time of --dead-man: the PC or the cable may fail.
+There, times and the greatest feed are what it tells some fifty times a second.
 
 JSON: list of {press, from_mm, to_mm, time_s, feed_mm_s (the greatest), ended (\"distance\", \"soft limit\" or \"released\"),
 stop_s, stop_mm (from the key's release to rest; null if it was not released on the way)}; of a rotary axis deg in place of mm.
 
-Exit status: 1 if a fault ended a jog, 2 if a key is refused; the jogs before it are printed.";
+Exit status: 1 if a fault ended a jog, 2 if a key is refused, 4 if Ctrl-C released one; the jogs before it are printed.";
 
-/// Jog axes of the simulated machine: one key after the other, each until it rests.
+/// Jog axes of the simulated machine, or of one on a board: one key after the other, each until it rests.
 ///
 /// Positions and soft limits count from where the machine is switched on, as in programs.
 #[derive(Debug, Args)]
@@ -45,12 +55,35 @@ pub struct JogArguments {
     /// Machine file (`motion machine` prints one); without it, the reference machine.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
+    #[command(flatten)]
+    port: OptionalPort,
+    /// On a board: after so long a silence of this command it holds, s; 0.15 to 60.
+    #[arg(long, value_name = "S", default_value_t = 0.25, requires = "port")]
+    dead_man: f64,
+    /// On a board: switch the drives on if they are off.
+    #[arg(long, requires = "port")]
+    enable: bool,
+    /// On a board: give up what it has of a program.
+    #[arg(long, requires = "port")]
+    restart: bool,
     /// Write every tick as a row of CSV; an existing file is replaced.
-    #[arg(long, value_name = "FILE.csv")]
+    #[arg(long, value_name = "FILE.csv", conflicts_with = "port")]
     trace: Option<PathBuf>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
+}
+
+impl JogArguments {
+    /// The time of the dead man \[ms\].
+    fn dead_man_ms(&self) -> Result<u16, CliError> {
+        // A PC that has nothing else to say says something ten times a second.
+        if (0.15..=60.0).contains(&self.dead_man) {
+            return Ok((self.dead_man * 1e3).round() as u16);
+        }
+        let found = format!("--dead-man {}", self.dead_man);
+        Err(CliError::Arguments { found, expected: "from 0.15 to 60 s" })
+    }
 }
 
 #[derive(Serialize)]
@@ -104,20 +137,82 @@ fn jog<const N: usize>(
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
     let keys = Keys::new(machine, &arguments.presses, arguments.feed)?;
+    if let Some(port) = arguments.port.given() {
+        return jog_on_board(machine, arguments, (&port, &keys), out);
+    }
     let mut jogged = Vec::new();
     let info = RunInfo::of_machine(machine);
     let (ended, ticks) = outputs.of_ticks(&info, |observe| keys.jog(&mut jogged, observe));
     // Finished jogs are written and shown, even if the next key failed.
     let written = ticks.write(|_| info.empty_trace());
-    let press = |jogged: &Jogged| InUnit(jogged.unit, PressJson::new(jogged, machine.tick_s));
+    show(&jogged, machine.tick_s, arguments.json, out)?;
+    ended.map_err(CliError::Jog)?;
+    written.outcome(Outcome::Done)
+}
+
+/// The keys on a board.
+fn jog_on_board<const N: usize>(
+    machine: &Machine<N>,
+    arguments: &JogArguments,
+    (port, keys): (&PortArguments, &Keys<'_, N>),
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
+    if port.port == Port::Simulator {
+        let (connection, _board) = port.simulated(machine)?;
+        return press(&Job::<N>::new(machine, &[]), machine, arguments, (port, keys), connection, out);
+    }
+    on_axis_count!(machine.axis_count(), M => {
+        let connection = port.open::<M>()?;
+        press(&Job::<M>::new(machine, &[]), machine, arguments, (port, keys), connection, out)
+    })
+}
+
+/// Presses the keys, which Ctrl-C releases.
+fn press<const N: usize, const M: usize>(
+    job: &Job<M>,
+    machine: &Machine<N>,
+    arguments: &JogArguments,
+    (port, keys): (&PortArguments, &Keys<'_, N>),
+    mut connection: Connection<M>,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
+    let dead_man_ms = arguments.dead_man_ms()?;
+    let axes: Vec<String> = machine.driven_axes().iter().map(|axis| axis.name.clone()).collect();
+    let found = if arguments.restart { Found::GivenUp } else { Found::Stays };
+    let may = Permissions { enables: arguments.enable, found, ..Permissions::default() };
+    let jogs = Jogs { keys, job, axes: &axes, may, dead_man_ms };
+    let (mut jogged, mut is_released, mut ended) = (Vec::new(), false, Ok(()));
+    send::greet(&mut connection).map_err(|error| port.refused(error))?;
+    interrupt::hold_first();
+    for key in 0..keys.count() {
+        let one = jogs.press(key, &mut connection, &mut || {
+            is_released |= interrupt::take_asked().is_some();
+            is_released
+        });
+        match one {
+            Ok(one) => jogged.push(one),
+            Err(error) => ended = Err(port.refused(error)),
+        }
+        if is_released || ended.is_err() {
+            break;
+        }
+    }
+    // Where the board is lost it holds by itself.
+    let _ = connection.settle();
+    show(&jogged, machine.tick_s, arguments.json, out)?;
+    ended.map(|()| if is_released { Outcome::Aborted } else { Outcome::Done })
+}
+
+/// Prints what became of the keys.
+fn show(jogged: &[Jogged], tick_s: f64, is_json: bool, out: &mut dyn Write) -> Result<(), CliError> {
+    let press = |jogged: &Jogged| InUnit(jogged.unit, PressJson::new(jogged, tick_s));
     let presses: Vec<InUnit<PressJson>> = jogged.iter().map(press).collect();
-    if arguments.json {
+    if is_json {
         write_json(&presses, out)?;
     } else if !presses.is_empty() {
         write_table(&presses, out).map_err(CliError::Output)?;
     }
-    ended.map_err(CliError::Jog)?;
-    written.outcome(Outcome::Done)
+    Ok(())
 }
 
 fn write_table(presses: &[InUnit<PressJson>], out: &mut dyn Write) -> io::Result<()> {

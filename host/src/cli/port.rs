@@ -22,6 +22,24 @@ pub(super) struct PortArguments {
     baud: u32,
 }
 
+/// Where a board is, for commands that do without one, too.
+#[derive(Debug, Args)]
+pub(super) struct OptionalPort {
+    /// Where the board is, as of `motion send`; without it, the simulated machine moves in no time.
+    #[arg(long)]
+    port: Option<Port>,
+    /// Bits a second of a serial port.
+    #[arg(long, value_name = "BITS_S", default_value_t = 921_600, requires = "port")]
+    baud: u32,
+}
+
+impl OptionalPort {
+    /// The port, if one is asked for.
+    pub(super) fn given(&self) -> Option<PortArguments> {
+        Some(PortArguments { port: self.port.clone()?, baud: self.baud })
+    }
+}
+
 impl PortArguments {
     /// An error at this port.
     pub(super) fn refused(&self, source: BoardError) -> CliError {

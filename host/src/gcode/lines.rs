@@ -78,7 +78,8 @@ mod tests {
             "G1 X1 F600\n\no1 if [0]\nX2\no1 endif\no2 repeat [2]\nG91 X1\no2 endrepeat\nG90 X9\nM2\nX1\n";
         let found = lines(text);
         let once = |step| Once { step };
-        assert_eq!(found[..5], [once(0), once(1), once(1), Never, once(1)]);
+        // Behind a condition that does not hold, its end is jumped over, too.
+        assert_eq!(found[..5], [once(0), once(1), once(1), Never, Never]);
         assert_eq!(found[6], Again);
         assert_eq!(found[8..], [once(3), once(4), Never]);
         // The lines of a subroutine run once where it is called once, after the lines before the call.

@@ -198,8 +198,7 @@ impl<R: Real, const N: usize> Session<'_, R, N> {
         feed_mm_s: f64,
         observe: &mut Observer<'_, N>,
     ) -> Result<Jogged, JogError> {
-        let travel = self.machine.travel()[axis].map(|[least, greatest]| Travel { least, greatest });
-        let of_axis = JogAxis { travel, ..jog_axis(self.machine, axis) };
+        let of_axis = within_travel(self.machine, axis);
         let jog = Jog::new(&of_axis, axis, self.set, press.target, feed_mm_s, self.machine.tick_s);
         let jog = jog.map_err(|source| {
             let (press, unit) = (press.to_string(), self.machine.axes[axis].unit());
@@ -243,6 +242,12 @@ impl<R: Real, const N: usize> Session<'_, R, N> {
     }
 }
 
+/// What an axis may do, that knows its soft limits.
+fn within_travel<const N: usize>(machine: &Machine<N>, axis: usize) -> JogAxis {
+    let travel = machine.travel()[axis].map(|[least, greatest]| Travel { least, greatest });
+    JogAxis { travel, ..jog_axis(machine, axis) }
+}
+
 /// Keys of a machine, each at a feed that its axis has.
 #[derive(Clone, Debug)]
 pub struct Keys<'a, const N: usize = 3> {
@@ -281,6 +286,54 @@ impl<'a, const N: usize> Keys<'a, N> {
             Ok((axis, feed_mm_s, press))
         };
         Ok(Self { machine, presses: presses.iter().map(key).collect::<Result<_, _>>()? })
+    }
+
+    /// The number of keys.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.presses.len()
+    }
+
+    /// A key's axis, from 0, and its press.
+    ///
+    /// # Panics
+    /// There are fewer keys.
+    #[must_use]
+    pub fn key(&self, key: usize) -> (usize, &'a Press) {
+        let (axis, _, press) = self.presses[key];
+        (axis, press)
+    }
+
+    /// What a key's axis counts.
+    ///
+    /// # Panics
+    /// There are fewer keys.
+    #[must_use]
+    pub fn unit(&self, key: usize) -> AxisUnit {
+        self.machine.axes[self.presses[key].0].unit()
+    }
+
+    /// The jog of a key on a board of `M` axes that stands at `start`.
+    ///
+    /// # Errors
+    /// The kernel refuses it.
+    ///
+    /// # Panics
+    /// There are fewer keys.
+    pub fn on_board<const M: usize>(
+        &self,
+        key: usize,
+        start: [Position; M],
+    ) -> Result<Jog<M>, motion_kernel::jog::JogError> {
+        let (axis, feed_mm_s, press) = self.presses[key];
+        Jog::new(
+            &within_travel(self.machine, axis),
+            axis,
+            start,
+            press.target,
+            feed_mm_s,
+            self.machine.tick_s,
+        )
     }
 
     /// Presses them one after the other, from where the machine is switched on; what came of each into

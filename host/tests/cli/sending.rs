@@ -275,3 +275,23 @@ fn a_program_is_gone_on_with_after_power_cuts() {
     let (status, _, error) = outcome(&mut workspace.command(&["resume", "--port", &board.1]));
     assert!(status == Some(2) && error.contains("motion/tcp-127-0-0-1-"), "{status:?} {error}");
 }
+
+/// Jog keys of a machine on a board.
+#[test]
+fn keys_jog_on_a_board() {
+    let workspace = Workspace::new("jog_board");
+    let board = Board::start(&workspace);
+    let jog = ["jog", "X+2", "Y-1", "--port", &board.1, "--feed", "20", "--json", "--dead-man"];
+    let (status, _, error) = outcome(workspace.command(&jog).arg("30"));
+    assert!(status == Some(2) && error.contains("found the drives off, expected --enable"), "{error}");
+    let (status, _, error) = outcome(workspace.command(&jog).args(["0.01", "--enable"]));
+    assert!(status == Some(2) && error.contains("found --dead-man 0.01, expected"), "{error}");
+    let (status, out, error) = outcome(workspace.command(&jog).args(["30", "--enable"]));
+    assert_eq!(status, Some(0), "{error}");
+    let jogged: Value = serde_json::from_str(&out).expect("JSON");
+    let to_mm: Vec<f64> = [0, 1].map(|key| number(&jogged[key]["to_mm"])).to_vec();
+    assert_eq!((to_mm, jogged[1]["ended"].as_str()), (vec![2.0, -1.0], Some("distance")));
+    let (status, _, error) =
+        outcome(&mut workspace.command(&["jog", "X+2", "--port", &board.1, "--trace", "jog.csv"]));
+    assert!(status == Some(2) && error.contains("--trace"), "{error}");
+}

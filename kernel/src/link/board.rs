@@ -129,6 +129,10 @@ pub struct BoardLink {
     said_ms: u32,
     /// The last frame was about items: a status that waits comes before the next one.
     is_status_next: bool,
+    /// Who asked last has said something since the last frame was written; when that was, and whether it is too long ago.
+    is_heard: bool,
+    heard_ms: u32,
+    is_silent: bool,
 }
 
 impl BoardLink {
@@ -164,6 +168,9 @@ impl BoardLink {
             said,
             said_ms: 0,
             is_status_next: false,
+            is_heard: false,
+            heard_ms: 0,
+            is_silent: false,
         }
     }
 
@@ -228,6 +235,7 @@ impl BoardLink {
                 self.is_welcome_due = true;
             }
             Request::Controls { controls, .. } => {
+                self.is_heard = true;
                 if controls.is_newer_than(&self.controls) && controls.are_within_range() {
                     (self.controls, self.is_changed) = (controls, true);
                 }
@@ -324,6 +332,12 @@ impl BoardLink {
         self.is_changed && (mode == Mode::Hold || override_permille == 0 || aborts != self.taken_aborts)
     }
 
+    /// Whether motion is to be held because who asked last says nothing any more, for the time that the controls tell.
+    #[must_use]
+    pub fn is_silent(&self) -> bool {
+        self.controls.dead_man_ms > 0 && self.is_silent && !self.is_heard
+    }
+
     /// The controls, if they have changed since they were taken last.
     pub fn take_controls(&mut self) -> Option<Controls> {
         self.taken_aborts = self.controls.aborts;
@@ -339,6 +353,10 @@ impl BoardLink {
         status: Option<Status<AXES>>,
         out: &mut [u8],
     ) -> usize {
+        if core::mem::take(&mut self.is_heard) {
+            (self.heard_ms, self.is_silent) = (now_ms, false);
+        }
+        self.is_silent |= now_ms.wrapping_sub(self.heard_ms) >= u32::from(self.controls.dead_man_ms);
         let (session, identity) = (self.session, self.identity);
         let reply = if core::mem::take(&mut self.is_welcome_due) {
             // What was said before may have been said to somebody else.

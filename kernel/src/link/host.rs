@@ -224,7 +224,7 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
     fn give_up(&mut self, program: u32, change: impl FnOnce(&mut Controls)) -> bool {
         let is_taken = self.control(|controls| {
             (controls.mode, controls.aborts) = (Mode::Hold, controls.aborts.wrapping_add(1));
-            controls.program = program;
+            (controls.program, controls.dead_man_ms) = (program, 0);
             change(controls);
         });
         if is_taken {

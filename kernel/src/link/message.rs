@@ -133,6 +133,8 @@ pub struct Controls {
     pub override_permille: u16,
     /// Rest at the end of every program block.
     pub is_single_block: bool,
+    /// After so long a silence of the PC the board holds by itself \[ms\]; 0: it does not. What is begun has 0 until it is set.
+    pub dead_man_ms: u16,
     /// Whether the drives are to be on.
     pub is_enabled: bool,
     /// Counts what was pressed to get there: enabled again after a fault is a command again.
@@ -151,6 +153,7 @@ impl Controls {
         program: 0,
         override_permille: 1000,
         is_single_block: false,
+        dead_man_ms: 0,
         is_enabled: false,
         power_presses: 0,
         fault_resets: 0,

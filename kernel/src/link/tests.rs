@@ -312,7 +312,8 @@ fn what_is_missing_is_sent_again_at_once() {
         steps(&mut bench, 1);
         bench.down.is_cut = false;
         let before = bench.board.driven.len();
-        steps(&mut bench, 25);
+        // Less than the time after which all is sent again.
+        steps(&mut bench, 32);
         assert!(bench.board.driven.len() > before + 8, "{} of {before}", bench.board.driven.len());
     }
 }

@@ -5,13 +5,15 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
 
 use motion_kernel::hal::{OutputState, Spindle};
+use motion_kernel::link::Event;
 use motion_kernel::program::Item;
 use motion_kernel::units::Position;
 
 use super::Typed;
 use super::shown::{Shown, at};
-use crate::board::{Connection, Job};
+use crate::board::{BoardError, Connection, Heard, Job};
 use crate::cli::error::{CliError, Outcome};
+use crate::cli::port::PortArguments;
 use crate::files::interrupt;
 
 /// A start in the middle of a program.
@@ -29,14 +31,26 @@ impl Middle {
     pub(super) fn confirm<const M: usize>(
         &self,
         job: &Job<M>,
-        connection: &mut Connection<M>,
+        (connection, port): (&mut Connection<M>, &PortArguments),
         keys: &Receiver<Typed>,
         shown: &Shown<'_>,
         out: &mut dyn Write,
     ) -> Result<Option<Outcome>, CliError> {
         let mut is_told = false;
         loop {
-            connection.step(Duration::from_millis(2), &mut |_| {});
+            // What is confirmed is for this board, as it is now.
+            let mut changed = None;
+            connection.step(Duration::from_millis(2), &mut |heard| match heard {
+                Heard::Lost(cause) => changed = Some(BoardError::Wire(std::io::Error::other(cause))),
+                Heard::Board(Event::Replaced) => changed = Some(BoardError::Replaced),
+                Heard::Board(Event::Restarted { .. }) => {
+                    changed = Some(BoardError::Reset { confirmed: 0, at: String::new() });
+                }
+                Heard::Board(_) | Heard::Back => {}
+            });
+            if let Some(changed) = changed {
+                return Err(port.refused(changed));
+            }
             if let Some(status) = connection.status()
                 && !std::mem::replace(&mut is_told, true)
             {

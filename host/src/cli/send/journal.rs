@@ -18,7 +18,8 @@ use crate::cli::error::CliError;
 use crate::cli::input::ReadingArguments;
 use crate::files::{Files, FilesError, STANDARD_INPUT};
 
-/// What every journal begins with.
+/// What a journal is known by, and that of this version.
+const FORMATS: &str = "motion journal ";
 const FORMAT: &str = "motion journal 1";
 /// At least between two writes.
 const PERIOD: Duration = Duration::from_millis(250);
@@ -98,6 +99,12 @@ impl Record {
     }
 }
 
+/// Whether a file is a journal, of this version or another: it may be written over.
+fn is_journal(text: &[u8]) -> bool {
+    let value: Option<serde_json::Value> = serde_json::from_slice(text).ok();
+    value.is_some_and(|value| value["format"].as_str().is_some_and(|format| format.starts_with(FORMATS)))
+}
+
 /// The place of the journal of a port: that of the user's programs for their state. None on a system that has none.
 #[must_use]
 pub(super) fn default_path(port: &Port) -> Option<PathBuf> {
@@ -145,7 +152,11 @@ impl Journal {
             }
         };
         if path.exists() {
-            Record::read(&path)?;
+            let name = || path.display().to_string();
+            let text = fs::read(&path).map_err(|source| CliError::Read { path: name(), source })?;
+            if !is_journal(&text) {
+                return Err(CliError::NoJournal { path: name() });
+            }
         }
         // Found before anything moves, as for every output; nothing is written yet.
         let inputs =
@@ -238,6 +249,11 @@ mod tests {
     fn what_is_no_journal_is_none() {
         for text in ["", "{}", "G1 X1", "{\"format\": \"motion journal 1\"}"] {
             assert_eq!(Record::parse(text.as_bytes()), None, "{text}");
+        }
+        // One of another version can't be gone on with, and is written over.
+        for (text, is_one) in [("G1 X1", false), ("{}", false), ("{\"format\": \"motion journal 2\"}", true)]
+        {
+            assert_eq!(is_journal(text.as_bytes()), is_one, "{text}");
         }
     }
 }

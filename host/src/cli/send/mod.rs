@@ -62,7 +62,7 @@ resets it, s switches single block. Ctrl-C holds; Ctrl-C again ends this command
 (SIGTERM) does both.
 
 A board without this command comes to rest on the path where its items end. A cable that was out is noticed: the board is
-held when it is in again, and r goes on.
+held when it is in again, and r goes on. After a power cut, of the board, of the PC or of both, `motion resume` goes on.
 
 Exit status: 0 done; 1 a fault, or the board was lost, reset, or asked by another sender; 2 the program or the board does
 not fit; 3 held, or at a program stop, and nobody there to resume (the end of standard input), or ended by SIGTERM; 4 aborted;
@@ -459,7 +459,7 @@ fn drive<const N: usize, const M: usize>(
     let keys = keys(arguments);
     let mut shown = Shown::new(arguments, &names, stops, (items, lines));
     if let Some(middle) = &middle
-        && let Some(outcome) = middle.confirm(job, &mut connection, &keys, &shown, out)?
+        && let Some(outcome) = middle.confirm(job, (&mut connection, &arguments.port), &keys, &shown, out)?
     {
         return Ok(outcome);
     }
@@ -537,7 +537,11 @@ fn drive<const N: usize, const M: usize>(
             if connection.is_lost() {
                 return Err(refused(BoardError::Wire(io::Error::other("no board any more"))));
             }
-            let goes_on = if step == Step::Drives { "; motion send --continue goes on" } else { "" };
+            let goes_on = match (step, &middle) {
+                (Step::Drives, None) => "; motion send --continue goes on",
+                (Step::Drives, Some(_)) => "; motion resume goes on",
+                _ => "",
+            };
             let what = format!("nobody resumes: the board stays held{goes_on}");
             return shown.end(out, &what).map(|()| Outcome::Held);
         }
