@@ -161,9 +161,11 @@ impl<'a, const M: usize> Sender<'a, M> {
                 Err(BoardError::Reset { confirmed: of_program, at: self.line_at(of_program) })
             }
             Event::Unreadable { item } => Err(BoardError::Item { at: self.line_at(item) }),
-            Event::Ready { .. } | Event::Status(_) | Event::Parameters { .. } | Event::Written { .. } => {
-                Ok(())
-            }
+            Event::Ready { .. }
+            | Event::Status(_)
+            | Event::Parameters { .. }
+            | Event::Written { .. }
+            | Event::Scope { .. } => Ok(()),
         }
     }
 
