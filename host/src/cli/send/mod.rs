@@ -19,6 +19,7 @@ use self::stops::Stops;
 use super::error::{CliError, Outcome};
 use super::input;
 use super::port::PortArguments;
+use super::scope::ScopeArguments;
 use crate::board::sender::{Found, Permissions, check_outputs};
 use crate::board::{BoardError, Connection, Heard, Job, Port, Sender, Step};
 use crate::files::STANDARD_INPUT;
@@ -26,6 +27,7 @@ use crate::files::interrupt::{self, Asked};
 use crate::gcode::Program;
 use crate::machine::{Machine, on_machine};
 use crate::planning::{Executable, Mode as PlanMode, Plan, on_axis_count, plan_program, require_outputs};
+use crate::simulate::RunInfo;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -36,6 +38,8 @@ Examples:
                                                      on a board at a serial port, with its drives on
   motion send part.ngc --port /dev/ttyACM0 --continue
                                                      goes on after what the board has of the program
+  motion send part.ngc --port /dev/ttyACM0 --scope ticks.csv --trigger 'err_um>50'
+                                                     and what the board did around ticks with a great following error
 
 The board first moves straight to the program's start, slowly, then drives the program.
 
@@ -81,6 +85,8 @@ pub struct SendArguments {
     /// Leave out the words of spindle and coolant that the machine has no output for.
     #[arg(long)]
     no_spindle: bool,
+    #[command(flatten)]
+    scope: ScopeArguments,
     /// Print lines of JSON: {step, state, line, set_mm, actual_mm, feed_mm_s, override, taken, items}, at every change, and
     /// twice a second.
     #[arg(long)]
@@ -200,6 +206,28 @@ fn drive<const N: usize, const M: usize>(
     mut connection: Connection<M>,
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
+    let info = RunInfo::of_machine(machine);
+    let scoped = arguments.scope.start(&info, &arguments.port, &mut connection)?;
+    let outcome = drive_to_end(arguments, (job, stops), machine, &mut connection, out);
+    match scoped {
+        Some(scoped) => {
+            let is_quiet = arguments.json;
+            // What was seen is kept, and why it ended is told.
+            let of_scope = scoped.finish(&mut connection, is_quiet, Outcome::Done, out);
+            let outcome = outcome?;
+            of_scope.map(|of_scope| if outcome == Outcome::Done { of_scope } else { outcome })
+        }
+        None => outcome,
+    }
+}
+
+fn drive_to_end<const N: usize, const M: usize>(
+    arguments: &SendArguments,
+    (job, stops): (&Job<M>, Stops),
+    machine: &Machine<N>,
+    connection: &mut Connection<M>,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
     let refused = |error: BoardError| arguments.port.refused(error);
     let names: Vec<String> = machine.driven_axes().iter().map(|axis| axis.name.clone()).collect();
     let found = match (arguments.continues, arguments.restart) {
@@ -237,7 +265,7 @@ fn drive<const N: usize, const M: usize>(
             sender.hear(&one).map_err(refused)?;
         }
         if let Some(asked) = interrupt::take_asked() {
-            sender.hold(&mut connection);
+            sender.hold(connection);
             if asked == Asked::End {
                 if !connection.settle() {
                     let told = "no confirmation of a hold: it drives what it has, and rests";
@@ -250,7 +278,7 @@ fn drive<const N: usize, const M: usize>(
         loop {
             match keys.try_recv() {
                 Ok(Typed::Key(key)) => {
-                    if !command(key, &mut connection, &mut sender) {
+                    if !command(key, connection, &mut sender) {
                         shown.say(out, "nothing is done: the board is lost, or there is no such key")?;
                     }
                 }
@@ -261,8 +289,8 @@ fn drive<const N: usize, const M: usize>(
                 break;
             }
         }
-        let step = sender.advance(&mut connection).map_err(refused)?;
-        shown.show(out, step, &connection)?;
+        let step = sender.advance(connection).map_err(refused)?;
+        shown.show(out, step, connection)?;
         match step {
             Step::Done => return shown.end(out, "done").map(|()| Outcome::Done),
             Step::Aborted => return shown.end(out, "aborted").map(|()| Outcome::Aborted),
