@@ -3,8 +3,8 @@
 
 use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -12,9 +12,10 @@ use motion_host::board::items::{InPlanning, Source};
 use motion_host::board::job::parameters;
 use motion_host::board::jog::Jogs;
 use motion_host::board::parameters::{Figures, read, write};
+use motion_host::board::scope::Ticks;
 use motion_host::board::sender::{Found, Permissions};
 use motion_host::board::simulator::{self, SimulatedBoard};
-use motion_host::board::{BoardError, Connection, Heard, Job, Port, Sender, Step};
+use motion_host::board::{BoardError, Connection, Heard, Job, Port, Scope, Sender, Step};
 use motion_host::gcode::ReadOptions;
 use motion_host::machine::Machine;
 use motion_host::planning::Executable;
@@ -522,4 +523,95 @@ fn a_jog_ends_by_itself_by_its_release_or_by_the_dead_man() {
 /// Where X stands, as told last \[mm\].
 fn stands_mm(connection: &Connection<3>) -> f64 {
     stands(connection)[0].to_mm()
+}
+
+/// What a scope has told: the ticks with the set positions, in order, and those that are missing.
+#[derive(Default)]
+struct Told {
+    rows: Vec<(u64, [f64; 3], &'static str)>,
+    missing: Vec<(u64, u64)>,
+}
+
+/// A program with a hold, another override and a cable that is cut: every tick is there, to the last one at the program's end, or
+/// named as missing while the cable was out.
+#[test]
+fn a_scope_has_every_tick_but_those_while_the_cable_was_out() {
+    let machine = Machine::reference();
+    let job = job(&zigzag(150), &machine);
+    let (_board, address) = board(&machine, 31);
+    let cable = Cable::to(address);
+    let mut connection = connect(cable.address, 31);
+    let record = read(&mut connection).expect("its parameters");
+    let told = Arc::new(Mutex::new(Told::default()));
+    let sink = {
+        let told = Arc::clone(&told);
+        Box::new(move |ticks: Ticks<'_, 3>| {
+            let mut told = told.lock().expect("sound");
+            match ticks {
+                Ticks::Row(row) => told.rows.push((row.tick, row.axes.map(|axis| axis.set_mm), row.state)),
+                Ticks::Gap(first, last) => told.missing.push((first, last)),
+            }
+        })
+    };
+    let identity = *connection.identity().expect("greeted");
+    connection.set_scope(Scope::start(&identity, &record, sink).expect("a machine"));
+    let (mut steps, mut since) = (0, Instant::now());
+    let step = drive(&job, ENABLES, &mut connection, |connection, sender, heard| {
+        let taken = connection.status().map_or(0, |status| status.taken);
+        let state = connection.status().map(|status| status.state);
+        let is_held = state == Some(State::Held) && !connection.is_lost();
+        let next = match steps {
+            0 if sender.step() == Step::Drives && taken > 100 => {
+                sender.hold(connection);
+                true
+            }
+            1 if is_held => {
+                let is_set = connection.command(|link| link.control(|to| to.override_permille = 700));
+                is_set && sender.resume(connection)
+            }
+            2 if taken > 250 => {
+                cable.cut(true);
+                true
+            }
+            3 if since.elapsed() > Duration::from_millis(300) => {
+                cable.cut(false);
+                true
+            }
+            4 => heard.contains(&Heard::Back),
+            5 if is_held => sender.resume(connection),
+            _ => false,
+        };
+        if next {
+            (steps, since) = (steps + 1, Instant::now());
+        }
+        false
+    });
+    assert_eq!((step.expect("driven"), steps), (Step::Done, 6));
+    let last = connection.status().map(|status| status.tick).expect("told");
+    // What was driven last comes behind the status that tells so.
+    let begin = Instant::now();
+    while begin.elapsed() < LONGEST
+        && told.lock().expect("sound").rows.last().is_none_or(|row| row.0 < u64::from(last))
+    {
+        connection.step(Duration::from_millis(1), &mut |_| {});
+    }
+    let summary = connection.end_scope().expect("begun");
+    let told = told.lock().expect("sound");
+    assert_eq!((summary.error, summary.is_foreign), (None, false));
+    assert_eq!((summary.ticks, &summary.gaps), (told.rows.len() as u64, &told.missing));
+    assert!(!told.missing.is_empty(), "the cable was out");
+    let (first, last) = (told.rows[0].0, told.rows[told.rows.len() - 1].0);
+    assert_eq!(summary.ticks + summary.missing(), last + 1 - first);
+    assert!(told.rows.is_sorted_by(|before, after| before.0 < after.0));
+    for &(first, last) in &told.missing {
+        assert!(!told.rows.iter().any(|row| (first..=last).contains(&row.0)), "{first} to {last}");
+    }
+    assert_eq!(told.rows[told.rows.len() - 1].1, end(&job).map(Position::to_mm));
+    let moving = told.rows.iter().filter(|row| row.2 == "moving").count();
+    assert!(moving > 5000, "{moving} ticks of motion");
+    println!(
+        "{} ticks, {moving} of motion, {:.2} bytes each",
+        summary.ticks,
+        summary.bytes as f64 / summary.ticks as f64
+    );
 }

@@ -66,3 +66,46 @@ impl<'de, T: Copy + Deserialize<'de>, const N: usize> Visitor<'de> for Elements<
         Ok(array)
     }
 }
+
+/// Rows of such arrays.
+pub mod rows {
+    use serde::de::{Deserialize, Deserializer};
+    use serde::ser::{Serialize, Serializer};
+
+    /// A row.
+    #[derive(Clone, Copy, serde::Serialize, serde::Deserialize)]
+    struct Row<T: Copy, const N: usize>(
+        #[serde(
+            with = "super",
+            bound(serialize = "T: serde::Serialize", deserialize = "T: serde::Deserialize<'de>")
+        )]
+        [T; N],
+    );
+
+    /// Writes the rows, one after the other.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize<T: Copy + Serialize, S: Serializer, const N: usize, const ROWS: usize>(
+        rows: &[[T; N]; ROWS],
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        super::serialize(&rows.map(Row), serializer)
+    }
+
+    /// Reads as many rows as there are.
+    ///
+    /// # Errors
+    /// There are fewer, or those of the deserializer.
+    pub fn deserialize<
+        'de,
+        T: Copy + Deserialize<'de>,
+        D: Deserializer<'de>,
+        const N: usize,
+        const ROWS: usize,
+    >(
+        deserializer: D,
+    ) -> Result<[[T; N]; ROWS], D::Error> {
+        super::deserialize(deserializer).map(|rows: [Row<T, N>; ROWS]| rows.map(|Row(row)| row))
+    }
+}

@@ -24,6 +24,10 @@ mod guarded;
 mod guarded;
 #[cfg(feature = "live")]
 mod reference;
+#[cfg(feature = "scope")]
+mod state;
+
+use serde::{Deserialize, Serialize};
 
 use crate::axis::{AxesConfig, AxisConfig, AxisOutput, AxisState, Correction, Preview};
 use crate::exec::{ExecState, Executor};
@@ -36,9 +40,11 @@ use crate::trace::Trace;
 use crate::units::{Counts, DacCode, Position};
 pub use corrected_intake::CorrectedIntake;
 use guarded::{Ending, Guards};
+#[cfg(feature = "scope")]
+pub use state::KernelState;
 
 /// Whether the drives may move.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 enum Power {
     Off,
     /// Enabled, and still held for this many ticks.

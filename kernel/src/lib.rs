@@ -16,6 +16,7 @@
 //!   live    hold, override, abort (optional)     feed lists           │
 //!   straight, jog, homing (optional)             Item ─► live         │
 //!   link    a wire to a PC (optional)            Item ─► live         │
+//!   scope   ticks for a PC (optional)            Recorder ─► link     │
 //!   queue   bounded, checked on entry            Feeder ─► Intake ◄───┘
 //!   ─────── tick ───────────────────────────────────────────────────────
 //!   exec    feed law ─► s, v, a, j, snap         PathMotion
@@ -79,8 +80,8 @@
 // Which feature an item needs, on docs.rs.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
-// Some shared code is called only by guards or live control; without them the linker drops it.
-#![cfg_attr(not(all(feature = "guards", feature = "live")), allow(dead_code))]
+// Some shared code is called only by guards, live control or the scope, which needs both; without them the linker drops it.
+#![cfg_attr(not(feature = "scope"), allow(dead_code))]
 // No panic path in code that runs on a board; tests may panic.
 #![cfg_attr(
     not(test),
@@ -107,6 +108,8 @@ pub mod flight;
 pub mod kernel;
 #[cfg(feature = "link")]
 pub mod link;
+#[cfg(feature = "scope")]
+pub mod scope;
 #[cfg(feature = "live")]
 pub mod straight;
 #[cfg(feature = "live")]

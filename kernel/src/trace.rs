@@ -1,5 +1,7 @@
 //! The record of a tick: everything that S4 shows of a run.
 
+use serde::{Deserialize, Serialize};
+
 use crate::axis::AxisOutput;
 use crate::exec::ExecState;
 use crate::exec::Executed;
@@ -8,13 +10,15 @@ use crate::hal::{MachineInputs, OutputState};
 use crate::num::Scalar;
 
 /// One tick of the whole kernel.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(bound(deserialize = "R: Copy + Deserialize<'de>"))]
 pub struct Trace<R, const AXES: usize> {
     /// Tick number since the start.
     pub tick: u64,
     /// Set values along the path and per axis; the last ones if a fault has stopped the executor.
     pub executed: Executed<R, AXES>,
     /// Encoder readings, actual values and outputs; with the drives off, the outputs stand still.
+    #[serde(with = "crate::array")]
     pub axes: [AxisOutput<R>; AXES],
     /// The digital inputs as the tick read them; without the feature `guards` those of the last tick with
     /// unhealthy inputs.

@@ -1,7 +1,7 @@
 //! What tick and background share, and the tick of every board.
 //!
 //! The tick has the higher priority and uses it freely; the background locks it for some tens of
-//! instructions, right after a tick.
+//! instructions, right after a tick; for a snapshot of the scope, which copies the kernel's state, for some hundreds.
 
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{Fault, FaultKind};
@@ -10,6 +10,7 @@ use motion_kernel::hal::{DriveEnable, Encoder, Inputs, OutputState, Outputs, Vel
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::Real;
 use motion_kernel::queue::Intake;
+use motion_kernel::scope::{Noting, Recorder};
 use motion_kernel::units::Position;
 
 use crate::tick_timing::TickTiming;
@@ -23,6 +24,8 @@ pub struct Control<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTE
     /// The tick's own figures; the board's interrupt adds to them.
     pub timing: TickTiming,
     pub(crate) flight: &'a mut FlightRecorder<R, AXES, ROWS, AFTER>,
+    /// Who is told every tick.
+    pub(crate) recorder: Option<Recorder<'a, R, AXES>>,
     is_healthy: bool,
     /// What spindle and coolant are to be switched to in the next tick.
     due: Option<OutputState>,
@@ -51,7 +54,13 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
         flight: &'a mut FlightRecorder<R, AXES, ROWS, AFTER>,
     ) -> Self {
         let timing = TickTiming::new();
-        Self { kernel, intake, timing, flight, is_healthy: false, due: None, is_switched: false }
+        let (recorder, is_healthy, is_switched) = (None, false, false);
+        Self { kernel, intake, timing, flight, recorder, is_healthy, due: None, is_switched }
+    }
+
+    /// From now on `recorder` is told every tick: the tick's part of a [scope](motion_kernel::scope::ScopeMemory).
+    pub fn set_recorder(&mut self, recorder: Recorder<'a, R, AXES>) {
+        self.recorder = Some(recorder);
     }
 
     /// One control tick. `unhealthy` is the fault found in the inputs (the emergency stop, a drive that is
@@ -64,10 +73,14 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
     {
         self.is_healthy = unhealthy.is_none();
         for kind in unhealthy.into_iter().chain(late) {
-            self.kernel.trip(kind);
+            self.trip(kind);
         }
-        let trace = self.kernel.tick(&mut self.intake, hal);
+        let mut noting = Noting::new(hal);
+        let trace = self.kernel.tick(&mut self.intake, &mut noting);
         self.flight.add(trace);
+        if let Some(recorder) = &mut self.recorder {
+            recorder.tick(trace, noting.failures());
+        }
         if trace.fault.is_some() {
             self.due = self.is_switched.then_some(OutputState::OFF);
         }
@@ -86,6 +99,9 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
     #[inline]
     pub fn trip(&mut self, kind: FaultKind<R>) {
         self.kernel.trip(kind);
+        if let Some(recorder) = &mut self.recorder {
+            recorder.trip(kind);
+        }
     }
 
     /// Whether the inputs allow a start.

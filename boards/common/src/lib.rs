@@ -53,6 +53,8 @@ pub mod liveness;
 
 #[cfg(test)]
 mod fixture;
+#[cfg(test)]
+mod scoped;
 
 pub use background::Background;
 pub use control::Control;

@@ -17,6 +17,7 @@ use motion_kernel::live::State;
 use motion_kernel::num::Real;
 use motion_kernel::program::SupplyError;
 use motion_kernel::queue::LiveFeeder;
+use motion_kernel::scope::{BODY_MAX, BoardScope, Command, Log};
 use rtic_core::Mutex;
 
 use crate::control::Control;
@@ -57,6 +58,7 @@ pub struct Linked<
     has_faulted: bool,
     dump: FlightDump,
     report: Report,
+    scope: Option<BoardScope<'a, R, AXES>>,
 }
 
 impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, const PARAMETERS: usize>
@@ -84,12 +86,20 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
             has_faulted: false,
             dump: FlightDump::default(),
             report: Report::default(),
+            scope: None,
         }
     }
 
     /// From now on `parameters`, the present ones as a compiled program, may be read by the PC. Its items do not matter.
     pub fn set_parameters(&mut self, parameters: &'a [u8]) {
         self.parameters = parameters;
+    }
+
+    /// From now on the PC may have every tick: with the background's parts of a
+    /// [`ScopeMemory`](motion_kernel::scope::ScopeMemory), whose tick's part [`Control::set_recorder`] takes.
+    pub fn set_scope(&mut self, scope: BoardScope<'a, R, AXES>, log: &'a mut Log<AXES>) {
+        self.scope = Some(scope);
+        self.streamed.set_log(log);
     }
 
     /// Parameters that the PC has written, and that suit the board. It is to store them and to start anew with them;
@@ -175,24 +185,40 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
             let is_waiting = matches!(control.seen().state, ExecState::Stopped | ExecState::Dwell);
             // At a program stop, or in a dwell, there is nothing to come to rest from.
             let is_aborted = live == State::Aborted || live == State::Aborting && is_waiting;
-            if requests.clears_fault && control.kernel.clear_fault().is_some() {
-                control.flight.clear();
+            let tick = control.kernel.trace().tick;
+            let mut note = |command: Command| {
+                if let Some(log) = streamed.log_mut() {
+                    log.command(tick, command);
+                }
+            };
+            if requests.clears_fault {
+                note(Command::ClearFault);
+                if control.kernel.clear_fault().is_some() {
+                    control.flight.clear();
+                }
             }
             let here = match requests.power {
-                Some(false) => Some(control.kernel.stand_here()),
+                Some(false) => {
+                    note(Command::StandHere);
+                    Some(control.kernel.stand_here())
+                }
                 Some(true) if may_enable && control.may_enable() => {
+                    let settle_ticks = board.settle_ticks();
+                    note(Command::StandHere);
+                    note(Command::Enable { settle_ticks });
                     let here = control.kernel.stand_here();
-                    control.kernel.enable(board.settle_ticks());
+                    control.kernel.enable(settle_ticks);
                     Some(here)
                 }
-                _ if is_aborted => control.kernel.rest_here(),
+                _ if is_aborted => control.kernel.rest_here().inspect(|_| note(Command::RestHere)),
                 _ => None,
             };
-            if let Some(here) = here {
-                streamed.restart(&mut control.intake, here);
-            }
             if requests.resumes {
+                note(Command::Resume);
                 control.kernel.resume();
+            }
+            if let Some(here) = here {
+                streamed.restart(&mut control.intake, here, tick);
             }
             here.is_some()
         })
@@ -272,7 +298,9 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
             return length;
         }
         if now_ms.wrapping_sub(self.status_ms) < STATUS_MS {
-            return self.streamed.transmit(now_ms, None, out);
+            let length = self.streamed.transmit(now_ms, None, out);
+            // In the room that is left.
+            return if length > 0 { length } else { self.transmit_scope(control, out) };
         }
         self.status_ms = now_ms;
         let (live, starvations) = (self.streamed.state(), self.streamed.starvations());
@@ -308,6 +336,31 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
             }),
             out,
         )
+    }
+
+    /// The next frame of the scope.
+    #[inline(never)]
+    fn transmit_scope<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+        out: &mut [u8],
+    ) -> usize {
+        let Self { streamed, scope: Some(scope), .. } = self else { return 0 };
+        let asked = streamed.link_mut().scope();
+        let Some(log) = streamed.log_mut() else { return 0 };
+        scope.obey(asked, log);
+        if scope.is_snapshot_due(log) {
+            control.lock(|control| {
+                if let Control { kernel, intake, recorder: Some(recorder), .. } = control {
+                    scope.take_snapshot(kernel, intake, recorder, log);
+                }
+            });
+            streamed.tell_lists();
+        }
+        let mut bytes = [0; BODY_MAX];
+        let Some(body) = streamed.log_mut().and_then(|log| scope.body(log, &mut bytes)) else { return 0 };
+        let written = bytes.get(..body.length).unwrap_or_default();
+        streamed.link_mut().transmit_scope((body.epoch, body.number), written, out)
     }
 }
 

@@ -14,6 +14,7 @@ use motion_kernel::live::{Leads, LiveControl, State};
 use motion_kernel::num::Real;
 use motion_kernel::program::{SupplyError, Switching};
 use motion_kernel::queue::{Intake, LiveFeeder};
+use motion_kernel::scope::Log;
 use motion_kernel::units::Position;
 
 /// Frames of items that one poll puts away at most: motion is to be planned, too.
@@ -115,8 +116,8 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
 
     /// After an abort ([`State::Aborted`]), or where the drives are enabled: drops what was not driven, and begins anew on a
     /// machine that stands at `here`, with the items of the program after it. The operator's settings stay. `intake` is the
-    /// other end of the streams.
-    pub fn restart(&mut self, intake: &mut Intake<'_, R, AXES>, here: [Position; AXES]) {
+    /// other end of the streams, and `tick` the last one.
+    pub fn restart(&mut self, intake: &mut Intake<'_, R, AXES>, here: [Position; AXES], tick: u64) {
         let Self { feeder, control, obeyed, .. } = self;
         // Of the program before, even if it was never put out.
         control.source_mut().switched();
@@ -127,6 +128,8 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         set(obeyed, control);
         let is_restarted = feeder.restart(intake, here);
         debug_assert!(is_restarted, "both are ends of the same streams");
+        let Came { aborts, taken, .. } = control.source_mut().items_mut().came();
+        feeder.note_restart(tick, here, (aborts, taken));
     }
 
     /// Writes the next frame for the PC to `out`; see [`BoardLink::transmit`]. `status` is asked for the machine's status with
@@ -140,6 +143,21 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         let items = self.control.source_mut().items_mut();
         let status = status.map(|status| status(items.came()));
         self.link.get_mut().transmit(now_ms, items, status, out)
+    }
+
+    /// From now on `log` is told what the tick is handed.
+    pub(crate) fn set_log(&mut self, log: &'a mut Log<AXES>) {
+        self.feeder.set_log(log);
+    }
+
+    /// Who is told what the tick is handed.
+    pub(crate) fn log_mut(&mut self) -> Option<&mut Log<AXES>> {
+        self.feeder.log_mut()
+    }
+
+    /// Tells the log the lists that the tick has and will have.
+    pub(crate) fn tell_lists(&mut self) {
+        self.control.tell_lists(&mut self.feeder);
     }
 
     /// The board's end of the link.

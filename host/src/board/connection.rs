@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use motion_kernel::link::{Controls, Event, FRAME_MAX, HostLink, Identity, Mode, PushError, Status};
 use motion_kernel::program::Item;
 
+use super::scope::{Scope, ScopeSummary};
 use super::wire::Wire;
 
 /// Items that wait for a board's confirmation, and their bytes.
@@ -15,6 +16,8 @@ const BYTES: usize = 64 * 1024;
 const REOPEN_AFTER: Duration = Duration::from_millis(500);
 /// A board that has answered does so ten times a second and more: after this time it is not there.
 const SILENT_AFTER: Duration = Duration::from_secs(3);
+/// Where motion follows items that nobody here has sent, it is looked again after this time whether it has ended.
+const LOOK_AFTER: Duration = Duration::from_millis(500);
 
 /// What is heard of a board.
 // As the link's events, which it hands on.
@@ -47,6 +50,9 @@ pub struct Connection<const N: usize> {
     is_lost: bool,
     identity: Option<Identity>,
     status: Option<Status<N>>,
+    scope: Option<Scope<N>>,
+    /// When it was asked for a snapshot last.
+    looked: Instant,
 }
 
 impl<const N: usize> Connection<N> {
@@ -68,6 +74,8 @@ impl<const N: usize> Connection<N> {
             is_lost: false,
             identity: None,
             status: None,
+            scope: None,
+            looked: now,
         })
     }
 
@@ -127,17 +135,37 @@ impl<const N: usize> Connection<N> {
             return Err(io::Error::other("no answer"));
         }
         let (status, identity, mut has_come) = (&mut self.status, &mut self.identity, false);
+        let scope = &self.scope;
         let mut events = Vec::new();
         self.link.receive(&bytes[..count], now_ms, &mut |event| {
+            has_come = true;
             match event {
+                Event::Scope { is_first, body } => {
+                    if let Some(scope) = scope {
+                        scope.frame(is_first, body);
+                    }
+                    return;
+                }
                 Event::Status(told) => *status = Some(told),
                 Event::Welcome(told) | Event::Refused(told) => *identity = Some(told),
-                Event::Restarted { .. } => *status = None,
+                Event::Restarted { .. } => {
+                    *status = None;
+                    if let Some(scope) = scope {
+                        scope.restarted();
+                    }
+                }
                 _ => {}
             }
-            has_come = true;
             events.push(event);
         });
+        if let Some(scope) = &self.scope
+            && scope.wants_snapshot()
+            && self.looked.elapsed() > LOOK_AFTER
+        {
+            self.looked = Instant::now();
+            scope.snapshot_asked();
+            self.link.renew_scope();
+        }
         if has_come {
             self.heard = Instant::now();
             if std::mem::take(&mut self.is_lost) {
@@ -205,6 +233,9 @@ impl<const N: usize> Connection<N> {
 
     /// An item that the board has already, of a program that is gone on with; see [`HostLink::skip`].
     pub fn skip(&mut self, item: &Item<N>) {
+        if let Some(scope) = &self.scope {
+            scope.item(self.link.controls().aborts, Some(item));
+        }
         self.link.skip(item);
     }
 
@@ -213,7 +244,30 @@ impl<const N: usize> Connection<N> {
     /// # Errors
     /// See [`PushError`].
     pub fn push(&mut self, item: Option<&Item<N>>) -> Result<bool, PushError> {
-        self.link.push(item)
+        let is_taken = self.link.push(item)?;
+        if is_taken && let Some(scope) = &self.scope {
+            scope.item(self.link.controls().aborts, item);
+        }
+        Ok(is_taken)
+    }
+
+    /// From now on `scope` is told every tick, and the items that are pushed: it is to be there before the first of a program.
+    pub fn set_scope(&mut self, scope: Scope<N>) {
+        self.scope = Some(scope);
+        self.link.set_scope(true);
+    }
+
+    /// The scope, if there is one.
+    #[must_use]
+    pub fn scope(&self) -> Option<&Scope<N>> {
+        self.scope.as_ref()
+    }
+
+    /// Ends the scope: what it has come to, if there was one.
+    pub fn end_scope(&mut self) -> Option<ScopeSummary> {
+        let scope = self.scope.take()?;
+        self.link.set_scope(false);
+        Some(scope.finish())
     }
 
     /// Goes on with a board that has started anew.

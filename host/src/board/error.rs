@@ -7,6 +7,8 @@ use motion_kernel::link::{Identity, PROTOCOL, PushError, WriteError};
 use motion_kernel::program::ProgramError;
 use thiserror::Error;
 
+use super::scope::ScopeError;
+
 /// What a board and a program have to agree on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Agreement {
@@ -28,6 +30,9 @@ pub enum BoardError {
     /// The wire can't be opened.
     #[error("found {0}, expected a board")]
     Wire(#[from] io::Error),
+    /// Every tick can't be had of it.
+    #[error("{0}")]
+    Scope(#[from] ScopeError),
     /// Nothing answers.
     #[error("found no answer, expected a board that speaks the link's protocol")]
     Silent,
@@ -175,6 +180,7 @@ impl BoardError {
             | Self::Replaced
             | Self::Moves
             | Self::NoParameters(_)
+            | Self::Scope(_)
             | Self::Push(_) => false,
             Self::Disagrees { .. }
             | Self::Outputs { .. }

@@ -212,9 +212,11 @@ impl<'a, const M: usize> Sender<'a, M> {
                 Err(BoardError::Reset { confirmed: of_program, at: self.line_at(confirmed) })
             }
             Event::Unreadable { item } => Err(BoardError::Item { at: self.line_at(item) }),
-            Event::Ready { .. } | Event::Status(_) | Event::Parameters { .. } | Event::Written { .. } => {
-                Ok(())
-            }
+            Event::Ready { .. }
+            | Event::Status(_)
+            | Event::Parameters { .. }
+            | Event::Written { .. }
+            | Event::Scope { .. } => Ok(()),
         }
     }
 

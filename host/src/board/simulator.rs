@@ -21,6 +21,7 @@ use motion_kernel::link::{BoardLink, FRAME_MAX, Identity, PROTOCOL};
 use motion_kernel::live::Leads;
 use motion_kernel::program::FORMAT;
 use motion_kernel::queue::LiveStreams;
+use motion_kernel::scope::ScopeMemory;
 use rtic_core::Exclusive;
 
 use super::job;
@@ -42,6 +43,8 @@ const PARAMETERS: usize = 2048;
 /// Rows of its flight recorder, and how many of them come after a fault.
 const ROWS: usize = 64;
 const AFTER: usize = 16;
+/// Ticks that wait for a PC that wants all of them.
+const RECORDS: usize = 1024;
 /// Between two looks at clock and wire.
 const STEP: Duration = Duration::from_micros(500);
 /// A machine that is late by more does not catch up: time passes more slowly there.
@@ -212,6 +215,8 @@ fn run_once<const N: usize>(
     let mut flight = Box::new(FlightRecorder::<Number, N, ROWS, AFTER>::new());
     let mut streams = Box::new(LiveStreams::<Number, N, PIECES, SEGMENTS>::new());
     let (feeder, intake) = streams.split(header.rules, header.start);
+    let mut memory = Box::new(ScopeMemory::<Number, N, RECORDS>::new());
+    let (recorder, scope, log) = memory.split(&feeder);
     let Ok(counts) = hardware.latch();
     let kernel = Kernel::new(&machine.axes, header.start, counts);
     let mut control = Control::new(kernel, intake, &mut flight);
@@ -219,6 +224,8 @@ fn run_once<const N: usize>(
     let mut linked =
         Box::new(Linked::<Number, N, ITEMS, PLACES, PARAMETERS>::new(board, link, feeder, header.pulse));
     linked.set_parameters(record);
+    control.set_recorder(recorder);
+    linked.set_scope(scope, log);
     let World { wires, wire, pace, switches } = world;
     let (mut frame, mut bytes) = ([0; FRAME_MAX], [0; 4096]);
     let (mut begin, mut ticks) = (Instant::now(), 0_u64);

@@ -67,6 +67,7 @@ mod input;
 mod outputs;
 mod port;
 mod progress;
+mod scope;
 mod table;
 mod trace;
 mod units;

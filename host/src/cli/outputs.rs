@@ -42,7 +42,8 @@ impl Written {
         }
     }
 
-    fn add(&mut self, what: &'static str, name: String, done: Result<(), FilesError>) {
+    /// Notes a file that was to be written.
+    pub(super) fn add(&mut self, what: &'static str, name: String, done: Result<(), FilesError>) {
         match done {
             Ok(()) => self.files.push((what, name)),
             Err(failure) => self.failures.push(failure),

@@ -10,16 +10,20 @@ use motion_kernel::units::Position;
 use super::error::{CliError, Outcome};
 use super::parameters::identity;
 use super::port::PortArguments;
-use super::send::state_words;
-use crate::board::{BoardError, Connection, Heard};
+use super::scope::ScopeArguments;
+use super::send::{greet, state_words};
+use crate::board::{BoardError, Connection, Heard, Scope};
+use crate::gcode::Axis;
 use crate::planning::on_axis_count;
-use crate::simulate::faults;
+use crate::simulate::{RunInfo, SheetAxis, faults};
 
 const EXAMPLES: &str = "\
 Examples:
   motion watch --port /dev/ttyACM0                   a line for every change, and every second
   motion watch --port tcp:localhost:5000 --json      lines of JSON: {tick, state, line, set_mm, actual_mm, feed_mm_s, taken,
                                                      starvations, is_ready, fault}
+  motion watch --port /dev/ttyACM0 --seconds 10 --scope ticks.csv
+                                                     every tick, of a machine at rest or in the hand
 
 Commands nothing. A wire has one end: while it watches, nobody else can send, and while somebody sends it finds no answer.
 Ctrl-C ends it.";
@@ -30,6 +34,8 @@ Ctrl-C ends it.";
 pub struct WatchArguments {
     #[command(flatten)]
     port: PortArguments,
+    #[command(flatten)]
+    scope: ScopeArguments,
     /// End after this time, s; without it, only Ctrl-C ends it.
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
@@ -54,11 +60,17 @@ pub fn watch(arguments: &WatchArguments, out: &mut dyn Write) -> Result<Outcome,
     if !arguments.json {
         writeln!(out, "{header}").map_err(CliError::Output)?;
     }
-    on_axis_count!(usize::from(identity.axes), M => show::<M>(arguments, out))
+    on_axis_count!(usize::from(identity.axes), M => show::<M>(arguments, identity.tick_s, out))
 }
 
-fn show<const M: usize>(arguments: &WatchArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
+fn show<const M: usize>(
+    arguments: &WatchArguments,
+    tick_s: f64,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
     let mut connection: Connection<M> = arguments.port.open()?;
+    greet(&mut connection).map_err(|error| arguments.port.refused(error))?;
+    let scoped = arguments.scope.start(&info(M, tick_s), &arguments.port, &mut connection)?;
     let (begin, mut last, mut told) = (Instant::now(), None, Instant::now());
     while arguments.seconds.is_none_or(|seconds| begin.elapsed().as_secs_f64() < seconds) {
         let (mut lost, mut is_new) = (None, false);
@@ -74,6 +86,9 @@ fn show<const M: usize>(arguments: &WatchArguments, out: &mut dyn Write) -> Resu
                 writeln!(out, "the board has started anew").map_err(CliError::Output)?;
             }
         }
+        if connection.scope().is_some_and(Scope::has_failed) {
+            break;
+        }
         if let Some(cause) = lost {
             return Err(arguments.port.refused(cause));
         }
@@ -85,7 +100,22 @@ fn show<const M: usize>(arguments: &WatchArguments, out: &mut dyn Write) -> Resu
         (last, told) = (Some(now), Instant::now());
         line(arguments, status, out).and_then(|()| out.flush()).map_err(CliError::Output)?;
     }
-    Ok(Outcome::Done)
+    match scoped {
+        Some(scoped) => scoped.finish(&mut connection, arguments.json, Outcome::Done, out),
+        None => Ok(Outcome::Done),
+    }
+}
+
+/// A board's axes have no names.
+fn info(axes: usize, tick_s: f64) -> RunInfo {
+    let axis = |number: usize| SheetAxis {
+        name: format!("axis{number}"),
+        letter: Axis::X,
+        feed_mm_s: 0.0,
+        accel_mm_s2: 0.0,
+        jerk_mm_s3: 0.0,
+    };
+    RunInfo { tick_s, axes: (1..=axes).map(axis).collect(), ..RunInfo::default() }
 }
 
 fn line<const M: usize>(

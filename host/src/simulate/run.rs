@@ -211,7 +211,7 @@ fn run_in<R: Real, const N: usize>(
     Ok(summary)
 }
 
-pub(super) fn trace_row<R: Real, const N: usize>(
+pub(crate) fn trace_row<R: Real, const N: usize>(
     trace: &Trace<R, N>,
     start_mm: f64,
     contour: &mut Contour<N>,

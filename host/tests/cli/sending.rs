@@ -295,3 +295,42 @@ fn keys_jog_on_a_board() {
         outcome(&mut workspace.command(&["jog", "X+2", "--port", &board.1, "--trace", "jog.csv"]));
     assert!(status == Some(2) && error.contains("--trace"), "{error}");
 }
+
+/// Every tick of a program in a file, from rest to rest; then the board at rest, around a trigger; and what is refused.
+#[test]
+fn every_tick_is_written() {
+    let workspace = Workspace::new("scope");
+    workspace.put("part.ngc", STRINGER);
+    let board = Board::start(&workspace);
+    let port = board.1.as_str();
+    let send = ["send", "part.ngc", "--port", port, "--enable", "--scope", "ticks.csv"];
+    let (status, out, error) = outcome(&mut workspace.command(&send));
+    assert_eq!(status, Some(0), "{out} {error}");
+    assert!(out.contains(" 0 missing, ") && out.contains("scope written to ticks.csv"), "{out}");
+    let text = workspace.read("ticks.csv");
+    let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+    let column = |name: &str| rows[0].iter().position(|of| *of == name).expect("a column");
+    let (tick, state, set) = (column("tick"), column("state"), column("X_set_mm"));
+    let ticks: Vec<u64> = rows[1..].iter().map(|row| row[tick].parse().expect("a number")).collect();
+    assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1), "one after the other");
+    let moving: Vec<&Vec<&str>> = rows.iter().filter(|row| row[state] == "moving").collect();
+    // More than 2 s of the program.
+    assert!(moving.len() > 4000, "{} of {}", moving.len(), ticks.len());
+    // To the resolution of positions.
+    let end_mm: f64 = rows[rows.len() - 1][set].parse().expect("a number");
+    assert!((end_mm - 102.045_923_136).abs() <= f64::powi(2.0, -32), "{end_mm}");
+    let watch = ["watch", "--port", port, "--seconds", "0.5", "--scope", "rest.csv", "--trigger"];
+    let (status, out, error) = outcome(workspace.command(&watch).args(["v_mm_s>1", "--before", "5"]));
+    assert_eq!(status, Some(0), "{out} {error}");
+    assert!(out.contains("triggered 0 times"), "{out}");
+    assert_eq!(workspace.read("rest.csv").lines().count(), 1);
+    let (status, out, _) = outcome(workspace.command(&watch).args(["state=idle", "--json"]));
+    assert_eq!(status, Some(0), "{out}");
+    assert!(workspace.read("rest.csv").lines().count() > 300);
+    let (status, _, error) = outcome(workspace.command(&watch).arg("X_speed>1"));
+    assert_eq!(status, Some(2));
+    assert!(error.contains("found `X_speed>1`, expected COLUMN>VALUE"), "{error}");
+    let (status, _, error) = outcome(workspace.command(&watch).arg("X_err_um>1"));
+    assert_eq!(status, Some(2));
+    assert!(error.contains("expected an axis of the machine"), "{error}");
+}

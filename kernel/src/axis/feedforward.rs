@@ -313,7 +313,7 @@ struct Bed<R> {
     tick_s: R,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct BedState<R> {
     displacement_mm: R,
     velocity_mm_s: R,
@@ -382,7 +382,7 @@ struct Inverse<R> {
     bed: Option<(Bed<R>, R)>,
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct InverseState<R> {
     last_mm_s: R,
     output_mm_s: R,
@@ -452,7 +452,7 @@ struct More<R> {
 }
 
 /// The state of feedforward. The default is at rest.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FeedforwardState<R> {
     inverse: InverseState<R>,
     delay: Delay<R>,
@@ -460,7 +460,7 @@ pub struct FeedforwardState<R> {
 
 /// The commands of the last ticks. Delaying the output equals delaying the input, and is one number instead
 /// of three.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Delay<R> {
     past_mm_s: [R; PREVIEW_TICKS_MAX as usize],
     next: u8,

@@ -19,6 +19,8 @@
 //!
 //! Comparisons are written so that NaN is a fault.
 
+use serde::{Deserialize, Serialize};
+
 use super::check::{Check, fits};
 use super::{AxesConfig, AxesError, AxisConfig, AxisOutput, AxisState, GuardFigures, Guards};
 use crate::num::Real;
@@ -194,7 +196,7 @@ pub(crate) enum AxisFault<R> {
 }
 
 /// Why an axis may not continue, before it is judged what broke.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 enum Alarm<R> {
     #[default]
     None,
@@ -208,7 +210,7 @@ enum Alarm<R> {
 }
 
 /// A sample of an axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Sample<R> {
     /// There was a sample since the axis was enabled.
     is_taken: bool,
@@ -220,7 +222,7 @@ struct Sample<R> {
 }
 
 /// The state, which changes from tick to tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Guard<R> {
     /// Last change of the following error \[mm\].
     change_mm: R,

@@ -2,6 +2,8 @@
 
 use core::marker::PhantomData;
 
+use serde::{Deserialize, Serialize};
+
 use super::AxisConfig;
 use crate::num::Real;
 use crate::path::Setpoint;
@@ -24,7 +26,7 @@ impl<R: Real> GuardConfig<R> {
 }
 
 /// No state.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Guard<R>(PhantomData<R>);
 
 #[allow(clippy::unused_self, reason = "as the guard of the feature `guards`")]

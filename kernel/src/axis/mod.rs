@@ -208,7 +208,7 @@ impl<R: Real> AxisConfig<R> {
 }
 
 /// The state of an axis, which changes from tick to tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AxisState<R> {
     /// Added to the encoder's position: set by homing.
     pub offset: Position,
@@ -220,7 +220,7 @@ pub struct AxisState<R> {
 }
 
 /// The outcome of one tick of an axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AxisOutput<R> {
     /// The encoder's reading at the start of the tick.
     pub counts: Counts,

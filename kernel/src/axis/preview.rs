@@ -3,6 +3,8 @@
 //! All axes are delayed alike, by the same whole number of ticks: the path stays the same and is driven a few
 //! milliseconds later. In the tick; one place is read and written.
 
+use serde::{Deserialize, Serialize};
+
 use super::AxisFigures;
 use super::scale::ScaleError;
 use crate::num::{is_within, rolled, whole};
@@ -37,8 +39,9 @@ pub(super) fn preview_ticks(axes: &[AxisFigures], tick_s: f64) -> Result<u8, (us
 }
 
 /// The positions of the last ticks.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(crate) struct Preview<const AXES: usize> {
+    #[serde(with = "crate::array::rows")]
     past: [[Position; AXES]; PREVIEW_TICKS_MAX as usize],
     ticks: u8,
     next: u8,

@@ -40,7 +40,7 @@ pub(crate) struct Regulator<R> {
 }
 
 /// The regulator's state.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct RegulatorState<R> {
     /// ki·Σε \[mm/s\]: in units of the output, so that a new ki does not move it.
     integral_mm_s: R,

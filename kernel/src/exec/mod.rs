@@ -80,7 +80,8 @@ pub enum ExecFault {
 }
 
 /// The result of one tick.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(bound(deserialize = "R: Copy + Deserialize<'de>"))]
 pub struct Executed<R, const AXES: usize> {
     /// The executor's state at the end of the tick.
     pub state: ExecState,
@@ -91,10 +92,11 @@ pub struct Executed<R, const AXES: usize> {
     /// Program line of the current piece; 0 at rest.
     pub line: u32,
     /// Set-points of all axes.
+    #[serde(with = "crate::array")]
     pub setpoints: [Setpoint<R>; AXES],
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 enum Activity<R> {
     /// Between stretches.
     Rest,
@@ -112,7 +114,8 @@ enum Activity<R> {
 }
 
 /// Executes the streams, tick by tick.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(bound = "")]
 pub struct Executor<R: Real, const AXES: usize> {
     activity: Activity<R>,
     walker: Walker<AXES>,

@@ -1,11 +1,13 @@
 //! A feed segment under way: its phase, and the time in it. The segment itself stays in its queue.
 
+use serde::{Deserialize, Serialize};
+
 use super::Activity;
 use crate::law::{FeedSegment, PathMotion, Phase, Ticks};
 use crate::num::Real;
 use crate::units::Position;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Moving {
     /// Path position of the segment's start.
     start: Position,

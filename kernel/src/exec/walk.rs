@@ -3,6 +3,8 @@
 //! Consumes the path stream, up to [`PIECES_PER_TICK_MAX`] pieces per tick; produces the set-points at a path
 //! position. In the tick.
 
+use serde::{Deserialize, Serialize};
+
 use crate::law::PathMotion;
 use crate::num::Real;
 use crate::path::Setpoint;
@@ -29,13 +31,14 @@ pub(super) enum WalkError {
 }
 
 /// The machine's place on the path. The piece itself stays at the head of its queue.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Walker<const AXES: usize> {
     /// The head of the path stream is the piece under way.
     is_on_piece: bool,
     /// Path position of the piece's start, from the stretch's start.
     piece_start: Position,
     /// Where the machine rests between stretches.
+    #[serde(with = "crate::array")]
     rest: [Position; AXES],
     /// Number of pieces that may still end in this tick.
     ends_left: usize,

@@ -3,8 +3,10 @@
 //! Produced by a board once per tick, all axes at once; one byte per axis. Every input has its logical
 //! meaning: the board inverts a switch that opens when it is reached, so a broken wire reads as reached.
 
+use serde::{Deserialize, Serialize};
+
 /// The digital inputs of one axis.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AxisInputs(u8);
 
@@ -120,10 +122,11 @@ impl core::fmt::Debug for AxisInputs {
 }
 
 /// The digital inputs of a machine.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct MachineInputs<const AXES: usize> {
     /// Each axis.
+    #[serde(with = "crate::array")]
     pub axes: [AxisInputs; AXES],
     /// The emergency stop is open.
     pub emergency_stop: bool,

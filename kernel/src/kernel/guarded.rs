@@ -1,5 +1,7 @@
 //! Guards of the axes, and reactions on the path or along a ramp.
 
+use serde::{Deserialize, Serialize};
+
 use super::{Kernel, Power};
 use crate::axis::{AxisFault, SAMPLE_TICKS};
 use crate::exec::ExecState;
@@ -9,7 +11,7 @@ use crate::queue::Intake;
 use crate::units::DacCode;
 
 /// A reaction that takes time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Ending {
     /// Coming to rest on the path; at rest, until the preview has passed.
     Stopping { ticks_left: u32, is_at_rest: bool },
@@ -32,12 +34,14 @@ impl Ending {
 }
 
 /// The state that guards and reactions need.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Guards<const AXES: usize> {
     reactions: Reactions,
     /// The codes written last.
+    #[serde(with = "crate::array")]
     pub(super) written: [DacCode; AXES],
     /// The codes when the ramp began.
+    #[serde(with = "crate::array")]
     ramp_from: [DacCode; AXES],
     /// Place in the round of the axes' samples.
     pub(super) sample_ticks: u8,

@@ -1,6 +1,8 @@
 //! A kernel without guards: only the limit of the following error is watched, and every reaction is
 //! immediate.
 
+use serde::{Deserialize, Serialize};
+
 use super::{Kernel, Power};
 use crate::fault::{FaultKind, Reaction, Reactions};
 use crate::num::Real;
@@ -8,7 +10,7 @@ use crate::queue::Intake;
 use crate::units::DacCode;
 
 /// A reaction that takes time: there is none.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Ending {}
 
 impl Ending {

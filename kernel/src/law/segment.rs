@@ -86,7 +86,7 @@ impl Ticks {
 
 /// The parts of a segment, in order. A cruise has only a hold; a ramp that is cut early returns within its
 /// hold.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Phase {
     /// 0 … t₁: acceleration builds up.

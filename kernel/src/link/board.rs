@@ -114,6 +114,8 @@ pub struct BoardLink {
     /// The byte from which on the parameters are asked for.
     read_from: Option<u32>,
     is_written_due: bool,
+    /// Who wants the scope, and after which snapshot he needs another one.
+    scope: Option<(u32, u32)>,
     controls: Controls,
     /// They were not taken yet; how many aborts were.
     is_changed: bool,
@@ -157,6 +159,7 @@ impl BoardLink {
             has_parameters: false,
             read_from: None,
             is_written_due: false,
+            scope: None,
             controls: Controls::NONE,
             is_changed: false,
             taken_aborts: 0,
@@ -221,6 +224,9 @@ impl BoardLink {
         let Some((request, _)) = take::<Request>(self.deframer.payload()) else { return };
         match request {
             Request::Hello { asker } => {
+                if asker != self.asker {
+                    self.scope = None;
+                }
                 self.asker = asker;
                 // Another one may read what the one before could not make.
                 (self.is_welcome_due, self.is_unreadable) = (true, false);
@@ -230,6 +236,7 @@ impl BoardLink {
             | Request::Items { session, asker, .. }
             | Request::Read { session, asker, .. }
             | Request::Write { session, asker, .. }
+            | Request::Scope { session, asker, .. }
                 if (session, asker) != (self.session, self.asker) =>
             {
                 self.is_welcome_due = true;
@@ -248,7 +255,22 @@ impl BoardLink {
             Request::Items { .. } => self.has_items = true,
             Request::Read { offset, .. } => self.read_from = Some(offset),
             Request::Write { .. } => self.has_parameters = true,
+            Request::Scope { asker, after, .. } => self.scope = after.map(|after| (asker, after)),
         }
+    }
+
+    /// Who wants the scope, and after which snapshot he needs another one; see
+    /// [`BoardScope::obey`](crate::scope::BoardScope::obey).
+    #[must_use]
+    pub const fn scope(&self) -> Option<(u32, u32)> {
+        self.scope
+    }
+
+    /// Writes a frame of the scope to `out`, as [`Self::transmit`] does about all else.
+    pub fn transmit_scope(&self, (epoch, number): (u32, u32), body: &[u8], out: &mut [u8]) -> usize {
+        let reply = Reply::<1>::Scope { session: self.session, epoch, number };
+        let Some(mut payload) = Payload::of(&reply) else { return 0 };
+        if payload.push_all(body.iter().copied()) { payload.frame(out) } else { 0 }
     }
 
     /// Puts away the items that came last; false if none did.

@@ -66,6 +66,13 @@ pub enum Event<const AXES: usize> {
         /// Why they are not taken.
         error: Option<WriteError>,
     },
+    /// A frame of the scope, in order; see [`HostLink::set_scope`].
+    Scope {
+        /// The first one of a snapshot: those after the one before it are missing.
+        is_first: bool,
+        /// What [`Replay::take`](crate::scope::Replay::take) takes.
+        body: Piece,
+    },
     /// It can't read an item. Nothing more is sent.
     Unreadable {
         /// The item's number.
@@ -97,6 +104,16 @@ enum Ask {
     Write { record: Record, offset: u32, piece: Piece },
 }
 
+/// The scope as far as it has come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct ScopeStream {
+    /// The snapshot under way, and the number of the frame that is to come next.
+    epoch: u32,
+    next: u32,
+    /// A frame is missing: nothing behind it is of use.
+    is_lost: bool,
+}
+
 /// The PC's end of the link to a board of `AXES` axes, with room for `ITEMS` items in `BYTES` bytes that are not confirmed.
 #[derive(Debug)]
 pub struct HostLink<const AXES: usize, const ITEMS: usize, const BYTES: usize> {
@@ -123,6 +140,12 @@ pub struct HostLink<const AXES: usize, const ITEMS: usize, const BYTES: usize> {
     /// A board says that it is another one than before.
     is_asking: bool,
     ask: Option<Ask>,
+    /// What the scope has come to, if it is on; and what is to be asked for it, at which time it was last.
+    scope: Option<ScopeStream>,
+    is_scope_asked: bool,
+    scope_ms: Option<u32>,
+    /// The number of the hello after which it was.
+    scope_asker: u32,
     /// Counts the parameters written: answers about those before are old.
     attempt: u32,
     hello_ms: Option<u32>,
@@ -156,6 +179,10 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
             is_unreadable: false,
             is_asking: false,
             ask: None,
+            scope: None,
+            is_scope_asked: false,
+            scope_ms: None,
+            scope_asker: asker,
             attempt: asker,
             hello_ms: None,
             controls_ms: None,
@@ -341,6 +368,36 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         (self.ask, self.ask_ms) = (Some(Ask::Write { record, offset, piece }), None);
     }
 
+    /// Switches the scope on, or off. Its frames come as [`Event::Scope`]s; where one is missing, a snapshot is asked for.
+    pub fn set_scope(&mut self, is_on: bool) {
+        let was_on = core::mem::replace(&mut self.scope, is_on.then(ScopeStream::default)).is_some();
+        (self.is_scope_asked, self.scope_ms) = (is_on || was_on, None);
+    }
+
+    /// Asks for another snapshot.
+    pub fn renew_scope(&mut self) {
+        if let Some(scope) = &mut self.scope {
+            scope.is_lost = true;
+            (self.is_scope_asked, self.scope_ms) = (true, None);
+        }
+    }
+
+    /// Takes a frame of the scope; whether it follows what came before, and whether it is the first of a snapshot.
+    fn take_scope(&mut self, epoch: u32, number: u32) -> Option<bool> {
+        let scope = self.scope.as_mut()?;
+        let is_first = number == 0 && epoch != scope.epoch;
+        if is_first || epoch == scope.epoch && number == scope.next && !scope.is_lost {
+            *scope = ScopeStream { epoch, next: number.wrapping_add(1), is_lost: false };
+            self.is_scope_asked &= !is_first;
+            return Some(is_first);
+        }
+        if epoch != scope.epoch || !scope.is_lost {
+            *scope = ScopeStream { epoch, next: 0, is_lost: true };
+            (self.is_scope_asked, self.scope_ms) = (true, None);
+        }
+        None
+    }
+
     /// Takes what came in at the time `now_ms`, which may wrap.
     pub fn receive(&mut self, bytes: &[u8], now_ms: u32, on_event: &mut impl FnMut(Event<AXES>)) {
         for &byte in bytes {
@@ -365,7 +422,13 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
                         on_event(Event::Written { bytes, error });
                     }
                 }
-                Reply::Parameters { .. } | Reply::Written { .. } => {}
+                Reply::Scope { session, epoch, number } if self.is_of(session) => {
+                    let body = Piece::of(rest);
+                    if let Some(is_first) = self.take_scope(epoch, number) {
+                        on_event(Event::Scope { is_first, body });
+                    }
+                }
+                Reply::Parameters { .. } | Reply::Written { .. } | Reply::Scope { .. } => {}
                 _ if !rest.is_empty() => {}
                 Reply::Welcome { session, asker, identity, controls } => {
                     if asker == self.asker {
@@ -407,6 +470,10 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         on_event: &mut impl FnMut(Event<AXES>),
     ) {
         self.is_asking = false;
+        // The board forgets who asked before.
+        if self.scope.is_some() && self.scope_asker != self.asker {
+            self.set_scope(true);
+        }
         if self.is_of(session) || [Session::Lost(session), Session::Replaced].contains(&self.session) {
             return;
         }
@@ -418,6 +485,9 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         // What was pressed before is no command for this board: only what is pressed from now on.
         (self.controls, self.confirmed_controls) = (*controls, controls.number);
         on_event(Event::Welcome(*identity));
+        if self.scope.is_some() {
+            self.set_scope(true);
+        }
         if self.session == Session::Unknown {
             self.session = Session::Greeted(session);
             return;
@@ -511,6 +581,13 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
                     if payload.push_all(piece.bytes().iter().copied()) { payload.frame(out) } else { 0 }
                 }
             };
+        }
+        if self.is_scope_asked && is_due(self.scope_ms, REPEAT_MS) {
+            // Off is said once: what comes in spite of it is not taken.
+            (self.scope_ms, self.is_scope_asked) = (Some(now_ms), self.scope.is_some());
+            self.scope_asker = self.asker;
+            let after = self.scope.map(|scope| scope.epoch);
+            return frame(&Request::Scope { session, asker: self.asker, after }, out);
         }
         if is_ready { self.items(session, now_ms, out) } else { 0 }
     }

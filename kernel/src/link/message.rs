@@ -23,6 +23,9 @@ pub(super) enum Request {
     Read { session: u32, asker: u32, offset: u32 },
     /// Bytes of new parameters follow, to the payload's end, from this one on; what they are as a whole.
     Write { session: u32, asker: u32, record: Record, offset: u32 },
+    /// Switches the scope on, with another snapshot if `after` is not answered yet: the number of the last snapshot that is of
+    /// no use any more. None switches it off.
+    Scope { session: u32, asker: u32, after: Option<u32> },
 }
 
 /// Parameters on their way: how many bytes, their checksum, and which attempt it is.
@@ -91,6 +94,9 @@ pub(super) enum Reply<const AXES: usize> {
     Parameters { session: u32, offset: u32, length: u32 },
     /// What has come of new parameters: bytes, or why they are not taken.
     Written { session: u32, record: Record, bytes: u32, error: Option<WriteError> },
+    /// Of the scope: what follows, to the payload's end, is to be read in order. The number of the snapshot before it, and
+    /// which frame since that it is.
+    Scope { session: u32, epoch: u32, number: u32 },
 }
 
 /// What has come to the board.

@@ -11,6 +11,7 @@
 //!           ── parameters, in pieces, while drives are off ────►            ─► ParameterBuffer
 //!           ◄── taken: which came, how many more may ───────────            ◄─ ItemQueue
 //!           ◄── status: position, feed, line, fault ────────────            ◄─ Status        may be lost
+//!           ◄── scope: what every tick consumed ───────────────            ◄─ BoardScope    may be lost
 //! ```
 //!
 //! - `frame`: messages on the wire, in COBS with a CRC-32;

@@ -133,6 +133,15 @@ where
         self.reader.lookahead().queued().wrapping_sub(feeder.path_queued() as u32)
     }
 
+    /// Tells `feeder`'s log the lists that the tick has and will have, for who did not hear of them.
+    #[cfg(feature = "scope")]
+    pub fn tell_lists(&self, feeder: &mut LiveFeeder<'_, R, AXES>) {
+        let Some(log) = feeder.log_mut() else { return };
+        for (id, list) in self.timeline.handed() {
+            list.items().for_each(|item| log.keep(id, item));
+        }
+    }
+
     /// Whether it is at rest because the override is 0.
     pub fn is_stopped_by_override(&self, feeder: &LiveFeeder<'_, R, AXES>) -> bool {
         self.mode.feed_override() <= 0.0 && self.rests(feeder)

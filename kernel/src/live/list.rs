@@ -1,10 +1,15 @@
 //! A feed list as the background sees it: its items, and the splice at which each begins.
 
 use heapless::Vec;
+use serde::{Deserialize, Serialize};
 
 use super::brake::Braking;
 use super::splice::Splice;
-use crate::law::{CutRamp, Limits, Phase, PlannedRamp, Pulse, Ramp, Ticks, segment};
+use crate::law::{
+    CutRamp, FeedSegment, Limits, Phase, PlannedRamp, Pulse, Ramp, SegmentError, Ticks, segment,
+};
+use crate::num::Real;
+use crate::queue::FeedItem;
 pub(super) use crate::queue::LIST_ITEMS;
 use crate::units::Position;
 
@@ -18,8 +23,8 @@ const LIMIT_ROUNDING: f64 = 1.0e-12;
 const CUT_STEPS: usize = 40;
 
 /// An item of a feed list.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Item {
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) enum Item {
     /// A ramp or a cruise.
     Feed(PlannedRamp),
     /// A ramp cut in its rise, `at` after its start.
@@ -36,6 +41,22 @@ impl Item {
     /// Whether it is part of a stretch's feed.
     pub(super) fn is_feed(&self) -> bool {
         matches!(self, Self::Feed(_) | Self::Cut { .. })
+    }
+
+    /// As the tick has it.
+    ///
+    /// # Errors
+    /// The number type does not hold it.
+    pub(crate) fn ready<R: Real>(&self, tick_s: f64) -> Result<FeedItem<R>, SegmentError> {
+        Ok(match *self {
+            Self::Feed(PlannedRamp { ramp, length }) => {
+                FeedItem::Segment(FeedSegment::ramp(&ramp, length, tick_s)?)
+            }
+            Self::Cut { ramp, at, length } => FeedItem::Segment(FeedSegment::cut(&ramp, at, length, tick_s)?),
+            Self::End => FeedItem::EndOfStretch,
+            Self::Dwell(duration) => FeedItem::Dwell(duration),
+            Self::Stop => FeedItem::ProgramStop,
+        })
     }
 
     /// Whether it is a rest between stretches.
@@ -186,7 +207,7 @@ impl Item {
         keeps_limits.then_some(on)
     }
 
-    /// The duration of a phase of its [`FeedSegment`](crate::law::FeedSegment), if the item can be cut there.
+    /// The duration of a phase of its [`FeedSegment`], if the item can be cut there.
     pub(super) fn phase_duration(&self, phase: Phase, tick_s: f64) -> Option<Ticks> {
         let ramp = match self {
             Self::Feed(PlannedRamp { ramp, .. }) => ramp,

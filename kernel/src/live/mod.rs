@@ -86,5 +86,7 @@ mod timeline;
 
 pub use crate::program::Source;
 pub use control::{LiveControl, State};
+#[cfg(feature = "scope")]
+pub(crate) use list::Item as ListItem;
 pub use mode::{OVERRIDE_MAX, OVERRIDE_MIN};
 pub use timeline::Leads;

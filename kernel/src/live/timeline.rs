@@ -4,17 +4,17 @@
 //! takes back lists that it has not reached. The only part of live control that talks to the feed lists.
 //! Background.
 
-use super::list::{Item, LIST_ITEMS, List};
+use super::list::{LIST_ITEMS, List};
 use super::lookahead::Lookahead;
 use super::mode::Request;
 use super::places::{Places, Takeover};
 use super::program_feed::ProgramFeed;
 use super::splice::{BlockEnd, Splice};
-use crate::law::{FeedSegment, PlannedRamp, Ticks};
+use crate::law::Ticks;
 use crate::num::Real;
 use crate::program::SupplyError;
 use crate::program::supply::is_taken;
-use crate::queue::{Change, Density, LISTS, LiveFeeder, Progress, Rejection};
+use crate::queue::{Change, Density, FeedItem, LISTS, LiveFeeder, Progress, Rejection};
 use crate::units::Position;
 
 /// A ramp is cut at most this many ticks after the progress last seen.
@@ -112,6 +112,13 @@ impl Timeline {
     /// The list under way.
     pub(super) fn list(&self) -> &List {
         &self.under_way.list
+    }
+
+    /// The lists that the tick has and will have.
+    #[cfg(feature = "scope")]
+    pub(super) fn handed(&self) -> impl Iterator<Item = (u8, &List)> {
+        let next = self.next.as_ref().map(|next| &next.handed);
+        core::iter::once(&self.under_way).chain(next).map(|handed| (handed.id, &handed.list))
     }
 
     /// Where the next list begins.
@@ -300,24 +307,21 @@ impl Timeline {
     ) -> Result<(), SupplyError<E>> {
         let mut has_room = !list.is_overfull();
         for (start, item) in list.placed() {
-            let is_taken = match *item {
-                Item::Feed(PlannedRamp { ramp, length }) => {
-                    let segment = FeedSegment::ramp(&ramp, length, self.tick_s);
-                    is_taken(feeder.segment(id, segment.map_err(SupplyError::Segment)?))
-                }
-                Item::Cut { ramp, at, length } => {
-                    let segment = FeedSegment::cut(&ramp, at, length, self.tick_s);
-                    is_taken(feeder.segment(id, segment.map_err(SupplyError::Segment)?))
-                }
-                Item::End => {
+            let is_taken = match item.ready(self.tick_s).map_err(SupplyError::Segment)? {
+                FeedItem::Segment(segment) => is_taken(feeder.segment(id, segment)),
+                FeedItem::EndOfStretch => {
                     // If all blocks of the stretch have been passed, so has its end.
                     let path = lookahead.end_of(start.stretch).unwrap_or(start.at);
                     is_taken(feeder.end_of_feed(id, path))
                 }
-                Item::Dwell(duration) => is_taken(feeder.dwell(id, duration)),
-                Item::Stop => is_taken(feeder.program_stop(id)),
+                FeedItem::Dwell(duration) => is_taken(feeder.dwell(id, duration)),
+                FeedItem::ProgramStop => is_taken(feeder.program_stop(id)),
             };
             has_room &= is_taken.map_err(SupplyError::Rejected)?;
+            #[cfg(feature = "scope")]
+            if let Some(log) = feeder.log_mut() {
+                log.item(id, item);
+            }
         }
         if has_room {
             Ok(())

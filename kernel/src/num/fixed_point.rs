@@ -69,6 +69,7 @@
 use core::ops::{Add, Div, Mul, Neg, Sub};
 
 use fixed::types::{I3F29, I32F32};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::{Real, Root, Scalar, Unit};
 
@@ -87,6 +88,19 @@ impl Fixed {
     #[must_use]
     pub(crate) const fn to_bits(self) -> i64 {
         self.0.to_bits()
+    }
+}
+
+/// As its bits.
+impl Serialize for Fixed {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_i64(self.to_bits())
+    }
+}
+
+impl<'de> Deserialize<'de> for Fixed {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        i64::deserialize(deserializer).map(Self::from_bits)
     }
 }
 

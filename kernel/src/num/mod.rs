@@ -113,7 +113,7 @@ pub trait Unit: Scalar + Coefficients {
 }
 
 /// A quantity with a unit, that the tick can compute with.
-pub trait Real: Scalar {
+pub trait Real: Scalar + serde::Serialize + serde::de::DeserializeOwned {
     /// The normalised quantities that scale it.
     type Unit: Unit;
     /// Distance from 1 to the next larger value.

@@ -11,12 +11,14 @@
 //! A piece starts at a fixed-point position; only the offset from there is a `Real`. Pieces are short
 //! ([`Real::PIECE_MM_MAX`]), so f32 offsets stay good to a hundredth of a 0.1 µm count.
 
+use serde::{Deserialize, Serialize};
+
 use crate::law::PathMotion;
 use crate::num::{Real, Scalar, Unit, is_finite, rolled};
 use crate::units::Position;
 
 /// The motion of one axis in one tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Setpoint<R> {
     /// Position.
     pub position: Position,

@@ -35,7 +35,7 @@ impl Change {
     /// The greatest [`Change::after`].
     pub const AFTER_MAX: u32 = (1 << Self::AFTER_BITS) - 1;
     /// No change is asked for.
-    pub(super) const NONE: u32 = u32::MAX;
+    pub(crate) const NONE: u32 = u32::MAX;
 
     /// The word of the `number`th change: no two words that the tick may compare are equal.
     pub(super) fn to_word(self, number: u32) -> u32 {
@@ -46,7 +46,7 @@ impl Change {
             | self.after & Self::AFTER_MAX
     }
 
-    pub(super) fn from_word(word: u32) -> Option<Self> {
+    pub(crate) fn from_word(word: u32) -> Option<Self> {
         let (from, to) = ((word >> 30) as u8, (word >> 28 & 3) as u8);
         let within = word >> 27 & 1 == 1;
         (from < LISTS && to < LISTS).then_some(Self { from, to, after: word & Self::AFTER_MAX, within })

@@ -11,6 +11,20 @@ use super::shared::Shared;
 use crate::law::{Phase, Ticks};
 use crate::num::Real;
 
+/// Where the tick is in what it was handed.
+#[cfg(feature = "scope")]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
+pub(crate) struct IntakeState {
+    /// The list under way, and how many of its items are done.
+    pub(crate) list: u8,
+    pub(crate) done: u32,
+    /// The words of the mailbox.
+    pub(crate) change: u32,
+    pub(crate) owned: u32,
+    /// Number of pieces and ends of stretch that are done.
+    pub(crate) path_taken: u32,
+}
+
 /// The tick's end of the streams.
 pub struct Intake<'a, R: Real, const AXES: usize> {
     pub(super) path: Consumer<'a, PathItem<R, AXES>>,
@@ -44,6 +58,25 @@ impl<R: Real, const AXES: usize> Intake<'_, R, AXES> {
         self.path_fill = self.path_fill.restarted(&self.shared.path_entered);
         self.feed_fill = self.feed_fill.restarted(&self.shared.feed_entered);
         self.lists.restart(&mut self.feed);
+    }
+
+    /// Where the tick is in what it was handed.
+    #[cfg(feature = "scope")]
+    pub(crate) fn state(&self) -> IntakeState {
+        let ((list, done), (change, owned)) = (self.lists.place(), self.lists.words());
+        IntakeState { list, done, change, owned, path_taken: self.path_fill.taken() }
+    }
+
+    /// After a restart: goes on from the state of the intake of other streams.
+    #[cfg(feature = "scope")]
+    pub(crate) fn go_to(&mut self, state: &IntakeState) {
+        self.lists.go_to(&mut self.feed, (state.list, state.done));
+    }
+
+    /// Empties a list that is not under way.
+    #[cfg(feature = "scope")]
+    pub(crate) fn clear_list(&mut self, list: u8) {
+        self.lists.clear(list);
     }
 
     /// Begins a tick: the producer has had its turn.

@@ -68,6 +68,38 @@ impl<'a, R: Real> Lists<'a, R> {
         self.0.is_some()
     }
 
+    /// What the background asks for; see [`Mailbox::words`].
+    pub(super) fn words(&self) -> (u32, u32) {
+        self.0.as_ref().map_or((Change::NONE, 0), |lists| lists.mailbox.words())
+    }
+
+    /// The list under way, and how many of its items are done.
+    pub(super) fn place(&self) -> (u8, u32) {
+        self.0.as_ref().map_or((0, 0), |lists| (lists.place.list(), lists.place.done()))
+    }
+
+    /// After [`Lists::restart`]: goes on at a place.
+    pub(super) fn go_to(&mut self, feed: &mut Consumer<'a, FeedItem<R>>, (list, done): (u8, u32)) {
+        let Some(lists) = &mut self.0 else { return };
+        for (other, queue) in &mut lists.others {
+            if *other == list {
+                *other = lists.place.list();
+                core::mem::swap(queue, feed);
+                break;
+            }
+        }
+        lists.place = ListPlace::new(list, done);
+    }
+
+    /// Empties a list that is not under way.
+    pub(super) fn clear(&mut self, list: u8) {
+        for (_, queue) in
+            self.0.iter_mut().flat_map(|lists| &mut lists.others).filter(|(other, _)| *other == list)
+        {
+            while queue.dequeue().is_some() {}
+        }
+    }
+
     /// Asks the background for a stop; returns whether it can make one.
     pub(super) fn want_stop(&self) -> bool {
         let Some(lists) = &self.0 else { return false };

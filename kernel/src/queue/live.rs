@@ -10,11 +10,15 @@ use super::accept::{Acceptance, PathRules};
 use super::change::{Change, LIST_ITEMS, LISTS, Progress};
 use super::counter::count;
 use super::density::Density;
+#[cfg(feature = "scope")]
+use super::handover::{AtomicU32, Ordering};
 use super::intake::Intake;
 use super::item::{FeedItem, PathItem, Refused};
 use super::lists::Lists;
 use super::mailbox::Mailbox;
 use super::rejection::Rejection;
+#[cfg(feature = "scope")]
+use super::room::has_room;
 use super::room::{Fill, enter, length};
 use super::shared::Shared;
 use super::streams::Streams;
@@ -24,6 +28,8 @@ use super::watch::{Access, Watcher};
 use crate::law::{FeedSegment, Ticks};
 use crate::num::Real;
 use crate::path::Piece;
+#[cfg(feature = "scope")]
+use crate::scope::{Begun, Handed, Log};
 use crate::units::Position;
 
 /// Storage of a path and three feed lists: `PIECES` − 1 pieces, `SEGMENTS` − 1 items a list.
@@ -74,6 +80,8 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize>
             feed_accept: acceptance,
             filled: None,
             changes: 0,
+            #[cfg(feature = "scope")]
+            log: None,
             #[cfg(any(test, feature = "watch"))]
             watcher: None,
         };
@@ -98,6 +106,15 @@ impl<R: Real, const AXES: usize, const PIECES: usize, const SEGMENTS: usize> Def
     }
 }
 
+/// What the background writes to the mailbox.
+#[derive(Clone, Copy)]
+enum Word {
+    Own(u8),
+    GiveUp(u8),
+    Ask(Change),
+    AskNothing,
+}
+
 /// The background's end.
 pub struct LiveFeeder<'a, R: Real, const AXES: usize> {
     path: Producer<'a, PathItem<R, AXES>>,
@@ -110,6 +127,9 @@ pub struct LiveFeeder<'a, R: Real, const AXES: usize> {
     filled: Option<u8>,
     /// Number of changes asked for so far.
     changes: u32,
+    /// Who is told what the tick was handed.
+    #[cfg(feature = "scope")]
+    log: Option<&'a mut Log<AXES>>,
     #[cfg(any(test, feature = "watch"))]
     watcher: Watcher<'a>,
 }
@@ -150,6 +170,34 @@ impl<'a, R: Real, const AXES: usize> LiveFeeder<'a, R, AXES> {
         self.feed_accept = self.path_accept;
         (self.filled, self.changes) = (None, 0);
         true
+    }
+
+    /// Where the number of the words is that were written to the mailbox.
+    #[cfg(feature = "scope")]
+    pub(crate) fn generation(&self) -> &'a AtomicU32 {
+        self.mailbox.generation_word()
+    }
+
+    /// From now on `log` is told what the tick is handed.
+    #[cfg(feature = "scope")]
+    pub fn set_log(&mut self, log: &'a mut Log<AXES>) {
+        self.log = Some(log);
+    }
+
+    /// Who is told what the tick is handed.
+    #[cfg(feature = "scope")]
+    pub fn log_mut(&mut self) -> Option<&mut Log<AXES>> {
+        self.log.as_deref_mut()
+    }
+
+    /// Tells the log that [`LiveFeeder::restart`] has begun anew, after `tick`: with the items of the program after so many
+    /// aborts, from the one with the number `first` on.
+    #[cfg(feature = "scope")]
+    pub fn note_restart(&mut self, tick: u64, position: [Position; AXES], (aborts, first): (u16, u32)) {
+        let path_entered = self.shared.path_entered.load(Ordering::Relaxed);
+        if let Some(log) = &mut self.log {
+            log.restart(tick, position, Begun { aborts, first, path_entered });
+        }
     }
 
     /// From now on refuses pieces that leave `travel` anywhere, not only at their ends.
@@ -223,8 +271,7 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
     /// at `feed_mm_s`, after `density`. `None` if there is none now.
     pub fn begin(&mut self, start: Position, feed_mm_s: R, density: Density) -> Option<u8> {
         let free = self.free_list()?;
-        let _access = self.access();
-        self.mailbox.own(free, true);
+        self.write(Word::Own(free));
         self.feed_accept = self.path_accept.feed_from(start, feed_mm_s, density);
         self.filled = Some(free);
         Some(free)
@@ -282,6 +329,33 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
         }
     }
 
+    /// Writes a word to the mailbox, and logs it.
+    fn write(&mut self, word: Word) {
+        let _access = self.access();
+        #[cfg(feature = "scope")]
+        let begin = self.mailbox.progress.ticks();
+        match word {
+            Word::Own(list) => self.mailbox.own(list, true),
+            Word::GiveUp(list) => self.mailbox.own(list, false),
+            Word::Ask(change) => self.mailbox.ask(Some(change), self.changes),
+            Word::AskNothing => self.mailbox.ask(None, 0),
+        }
+        #[cfg(feature = "scope")]
+        if let Some(log) = &mut self.log {
+            // A tick in between has seen the word or has not.
+            let is_certain = self.mailbox.progress.ticks() == begin;
+            log.hand(
+                is_certain.then(|| self.mailbox.generation()),
+                match word {
+                    Word::Own(list) => Handed::Begin { list },
+                    Word::GiveUp(list) => Handed::GiveUp { list },
+                    Word::Ask(change) => Handed::Change(change.to_word(self.changes)),
+                    Word::AskNothing => Handed::Change(Change::NONE),
+                },
+            );
+        }
+    }
+
     /// Number of items that a list still has room for.
     #[must_use]
     pub fn room(&self, list: u8) -> usize {
@@ -304,15 +378,13 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
             return Err(Rejection::Moving { feed_mm_s: feed_mm_s.to_f64() });
         }
         self.changes = self.changes.wrapping_add(1);
-        let _access = self.access();
-        self.mailbox.ask(Some(change), self.changes);
+        self.write(Word::Ask(change));
         Ok(())
     }
 
     /// Takes back the change asked for. The tick may have followed it already.
     pub fn no_change(&mut self) {
-        let _access = self.access();
-        self.mailbox.ask(None, 0);
+        self.write(Word::AskNothing);
     }
 
     /// Whether the change asked for came too late.
@@ -331,7 +403,45 @@ impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
 
     /// Gives up a list: the tick empties it.
     pub fn give_up(&mut self, list: u8) {
-        let _access = self.access();
-        self.mailbox.own(list, false);
+        self.write(Word::GiveUp(list));
+    }
+}
+
+/// What was handed to another tick, handed to this one again. Nothing is checked: it was, there.
+#[cfg(feature = "scope")]
+impl<R: Real, const AXES: usize> LiveFeeder<'_, R, AXES> {
+    /// Whether an item of path has room.
+    pub(crate) fn has_path_room(&self) -> bool {
+        has_room(&self.path)
+    }
+
+    /// Enters an item of path; false if there is no room.
+    pub(crate) fn enter_again(&mut self, item: PathItem<R, AXES>) -> bool {
+        let has_room = enter(&mut self.path, item).is_ok();
+        if has_room {
+            count(&self.shared.path_entered);
+        }
+        has_room
+    }
+
+    /// Appends an item to a list; false if there is no room.
+    pub(crate) fn append_again(&mut self, list: u8, item: FeedItem<R>) -> bool {
+        self.append(list, item).is_ok()
+    }
+
+    /// Sets the mailbox as another one was.
+    pub(crate) fn set_words(&mut self, change: u32, owned: u32) {
+        self.mailbox.set_words((change, owned));
+    }
+
+    /// Takes a list, or gives it up.
+    pub(crate) fn own_again(&mut self, list: u8, owned: bool) {
+        self.mailbox.own(list, owned);
+    }
+
+    /// Asks for the change of a word.
+    pub(crate) fn ask_again(&mut self, word: u32) {
+        let (_, owned) = self.mailbox.words();
+        self.mailbox.set_words((word, owned));
     }
 }

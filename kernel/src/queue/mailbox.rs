@@ -43,13 +43,13 @@ impl Mailbox {
         }
     }
 
-    /// Resets to the state after [`Mailbox::new`]. Neither end may be in use.
+    /// Resets to the state after [`Mailbox::new`], but for the generation, which goes on. Neither end may be in use.
     pub(super) fn reset(&self) {
         for word in [&self.change, &self.refused] {
             word.store(Change::NONE, Ordering::Relaxed);
         }
         self.owned.store(1, Ordering::Relaxed);
-        self.generation.store(0, Ordering::Relaxed);
+        count(&self.generation);
         self.progress.reset();
         self.stop_wanted.store(0, Ordering::Relaxed);
     }
@@ -80,6 +80,24 @@ impl Mailbox {
     pub(super) fn own(&self, list: u8, owned: bool) {
         let (bits, bit) = (self.owned.load(Ordering::Relaxed), 1 << list);
         self.owned.store(if owned { bits | bit } else { bits & !bit }, Ordering::Release);
+        count(&self.generation);
+    }
+
+    /// Where that number is.
+    pub(super) fn generation_word(&self) -> &AtomicU32 {
+        &self.generation
+    }
+
+    /// The change asked for, if it was not refused, and the lists owned, for another tick to go on from.
+    pub(super) fn words(&self) -> (u32, u32) {
+        let change = if self.is_refused() { Change::NONE } else { self.change.load(Ordering::Acquire) };
+        (change, self.owned.load(Ordering::Acquire))
+    }
+
+    /// Sets both as another background has them.
+    pub(super) fn set_words(&self, (change, owned): (u32, u32)) {
+        self.change.store(change, Ordering::Release);
+        self.owned.store(owned, Ordering::Release);
         count(&self.generation);
     }
 

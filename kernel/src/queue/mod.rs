@@ -75,6 +75,8 @@ pub(crate) use density::Density;
 pub use density::SEGMENTS_PER_TICK_MAX;
 pub use feeder::Feeder;
 pub use intake::Intake;
+#[cfg(feature = "scope")]
+pub(crate) use intake::IntakeState;
 pub use item::Refused;
 pub(crate) use item::{FeedItem, PathItem};
 #[cfg(feature = "live")]

@@ -40,6 +40,11 @@ impl ProgressWords {
         }
     }
 
+    /// The number of ticks.
+    pub(super) fn ticks(&self) -> u32 {
+        self.tick.load(Ordering::Acquire)
+    }
+
     /// The executor's progress, as far as the background can know.
     pub(super) fn progress(&self) -> Progress {
         let mut progress = self.read();

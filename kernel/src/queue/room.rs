@@ -50,6 +50,12 @@ impl Fill {
         Self { so_far, before_tick: so_far, ..self }
     }
 
+    /// Number of items taken so far.
+    #[cfg(feature = "scope")]
+    pub(super) fn taken(self) -> u32 {
+        self.so_far
+    }
+
     /// Begins a tick: the producer has had its turn.
     #[inline]
     pub(super) fn start_tick(&mut self) {

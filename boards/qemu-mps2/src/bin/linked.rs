@@ -33,6 +33,7 @@ use motion_kernel::kernel::Kernel;
 use motion_kernel::link::{BoardLink, Identity, PROTOCOL};
 use motion_kernel::live::Leads;
 use motion_kernel::program::{FORMAT, ProgramError, Reader};
+use motion_kernel::scope::ScopeMemory;
 use qemu_boards::hardware::{Hardware, Simulated};
 use qemu_boards::live::{PLACES, Streams};
 use qemu_boards::processor::{entry, wait};
@@ -51,9 +52,12 @@ const ITEMS: usize = 256;
 /// Rows of the flight recorder, which nobody asks for here.
 const ROWS: usize = 2;
 const AFTER: usize = 1;
+/// Ticks that wait for a PC that wants all of them: those of a plan for another override.
+const RECORDS: usize = 256;
 
 type Control = motion_board::Control<'static, Number, AXES, ROWS, AFTER>;
 type Flight = FlightRecorder<Number, AXES, ROWS, AFTER>;
+type Scope = ScopeMemory<Number, AXES, RECORDS>;
 type Linked = motion_board::Linked<'static, Number, AXES, ITEMS, PLACES>;
 type Machine = motion_board::Machine<'static, Number, AXES>;
 
@@ -128,14 +132,17 @@ fn run() -> Result<Infallible, &'static CStr> {
     let link = BoardLink::new(session as u32, identity(record, &machine));
     let streams = singleton!(Streams = Streams::new()).ok_or(TWICE)?;
     let (feeder, intake) = streams.split(machine.header().rules, machine.header().start);
+    let (recorder, scope, log) = singleton!(Scope = Scope::new()).ok_or(TWICE)?.split(&feeder);
     start(&machine, |kernel, hardware| {
         let flight = singleton!(Flight = Flight::new())?;
-        let control = Control::new(kernel, intake, flight);
+        let mut control = Control::new(kernel, intake, flight);
+        control.set_recorder(recorder);
         singleton!(Foreground = Foreground { control, hardware, ticks: 0 })
     })?;
     let pulse = machine.header().pulse;
     let linked = singleton!(Linked = Linked::new(&board, link, feeder, pulse)).ok_or(TWICE)?;
     linked.set_parameters(record);
+    linked.set_scope(scope, log);
     let mut port = Port::start(&mut peripherals.NVIC).ok_or(TWICE)?;
     tick_every(period, &mut peripherals.SYST);
     loop {

@@ -26,6 +26,7 @@ use self::stops::Stops;
 use super::error::{CliError, Outcome};
 use super::input;
 use super::port::PortArguments;
+use super::scope::ScopeArguments;
 use crate::board::from_line::from_line;
 use crate::board::items::{Said, Source};
 use crate::board::progress::{Place, Progress};
@@ -38,6 +39,7 @@ use crate::machine::{Machine, on_machine};
 use crate::planning::{
     Executable, Mode as PlanMode, Plan, PlanningError, on_axis_count, plan_program, require_outputs,
 };
+use crate::simulate::RunInfo;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -50,6 +52,8 @@ Examples:
                                                      goes on after what the board has of the program
   motion send part.ngc --port /dev/ttyACM0 --from-line 120
                                                      begins at the path of line 120
+  motion send part.ngc --port /dev/ttyACM0 --scope ticks.csv --trigger 'err_um>50'
+                                                     and what the board did around ticks with a great following error
 
 The board first moves straight to the program's start, slowly, then drives the program.
 
@@ -114,6 +118,8 @@ pub struct SendArguments {
     /// Leave out the words of spindle and coolant that the machine has no output for.
     #[arg(long)]
     no_spindle: bool,
+    #[command(flatten)]
+    scope: ScopeArguments,
     /// Print lines of JSON: {step, state, line, set_mm, actual_mm, feed_mm_s, override, taken, items}, at every change, and
     /// twice a second.
     #[arg(long)]
@@ -433,6 +439,28 @@ fn drive<const N: usize, const M: usize>(
     mut connection: Connection<M>,
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
+    let info = RunInfo::of_machine(machine);
+    let scoped = arguments.scope.start(&info, &arguments.port, &mut connection)?;
+    let outcome = drive_to_end(arguments, driven, machine, &mut connection, out);
+    match scoped {
+        Some(scoped) => {
+            let is_quiet = arguments.json;
+            // What was seen is kept, and why it ended is told.
+            let of_scope = scoped.finish(&mut connection, is_quiet, Outcome::Done, out);
+            let outcome = outcome?;
+            of_scope.map(|of_scope| if outcome == Outcome::Done { of_scope } else { outcome })
+        }
+        None => outcome,
+    }
+}
+
+fn drive_to_end<const N: usize, const M: usize>(
+    arguments: &SendArguments,
+    driven: Driven<'_, M>,
+    machine: &Machine<N>,
+    connection: &mut Connection<M>,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
     let refused = |error: BoardError| match error {
         BoardError::Program(error) => CliError::Program(error),
         error => arguments.port.refused(error),
@@ -459,7 +487,7 @@ fn drive<const N: usize, const M: usize>(
     let keys = keys(arguments);
     let mut shown = Shown::new(arguments, &names, stops, (items, lines));
     if let Some(middle) = &middle
-        && let Some(outcome) = middle.confirm(job, (&mut connection, &arguments.port), &keys, &shown, out)?
+        && let Some(outcome) = middle.confirm(job, (connection, &arguments.port), &keys, &shown, out)?
     {
         return Ok(outcome);
     }
@@ -479,7 +507,7 @@ fn drive<const N: usize, const M: usize>(
             sender.hear(&one).map_err(refused)?;
         }
         if let Some(asked) = interrupt::take_asked() {
-            sender.hold(&mut connection);
+            sender.hold(connection);
             if asked == Asked::End {
                 if !connection.settle() {
                     let told = "no confirmation of a hold: it drives what it has, and rests";
@@ -492,7 +520,7 @@ fn drive<const N: usize, const M: usize>(
         loop {
             match keys.try_recv() {
                 Ok(Typed::Key(key)) => {
-                    if !command(key, &mut connection, &mut sender) {
+                    if !command(key, connection, &mut sender) {
                         shown.say(out, "nothing is done: the board is lost, or there is no such key")?;
                     }
                 }
@@ -503,16 +531,16 @@ fn drive<const N: usize, const M: usize>(
                 break;
             }
         }
-        let step = sender.advance(&mut connection).map_err(refused)?;
+        let step = sender.advance(connection).map_err(refused)?;
         for said in sender.take_said() {
             match said {
                 Said::Stop(place, text) => shown.stops.add(place, text),
                 Said::Note(note) => shown.say(out, &format!("note: {note}"))?,
             }
         }
-        shown.show(out, step, &connection)?;
+        shown.show(out, step, connection)?;
         if let Some(journal) = &mut journal {
-            note(journal, &mut progress, &sender, &connection, names.len());
+            note(journal, &mut progress, &sender, connection, names.len());
         }
         if let Some(failure) = journal.as_mut().and_then(Journal::failure) {
             shown.say(out, &format!("the journal is not written any more: {failure}"))?;

@@ -15,6 +15,7 @@ use crate::board::{Connection, Job};
 use crate::cli::error::{CliError, Outcome};
 use crate::cli::input;
 use crate::cli::port::PortArguments;
+use crate::cli::scope::ScopeArguments;
 use crate::gcode::{Program, StepKind};
 use crate::planning::PlanningError;
 
@@ -57,6 +58,8 @@ pub struct ResumeArguments {
     /// Switch the drives off at the end.
     #[arg(long)]
     disable: bool,
+    #[command(flatten)]
+    scope: ScopeArguments,
     /// Print lines of JSON, as `motion send` does.
     #[arg(long)]
     json: bool,
@@ -113,7 +116,7 @@ pub(super) struct Resumed {
 /// # Errors
 /// The journal is refused, or what it is about is not the same any more; else those of [`send`](super::send).
 pub fn resume(arguments: &ResumeArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
-    let &ResumeArguments { ref journal, ref port, homed, yes, enable, clear_fault, disable, json } =
+    let &ResumeArguments { ref journal, ref port, homed, yes, enable, clear_fault, disable, ref scope, json } =
         arguments;
     let path = match journal.clone().or_else(|| default_path(&port.port)) {
         Some(path) => path,
@@ -148,6 +151,7 @@ pub fn resume(arguments: &ResumeArguments, out: &mut dyn Write) -> Result<Outcom
         continues: false,
         restart: false,
         no_spindle: record.no_spindle,
+        scope: scope.clone(),
         json,
     };
     send_program(&arguments, Some(&resumed), out)
