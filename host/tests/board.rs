@@ -252,6 +252,28 @@ fn another_sender_goes_on() {
     assert_eq!(stands(&connection), end(&job));
 }
 
+/// All of a program is on the board, held, when its sender is killed: the next one sends nothing, and sees it to its end.
+#[test]
+fn a_program_that_is_whole_on_the_board_is_gone_on_with() {
+    let machine = Machine::reference();
+    let job = job("G21 G90 G61\nG1 X40 F600\nM2\n", &machine);
+    let (_board, address) = board(&machine, 22);
+    let mut connection = connect(address, 1);
+    drive(&job, ENABLES, &mut connection, |connection, sender, _| {
+        let has_all = connection.next() == Some(job.items.len() as u32 + 1) && connection.has_all();
+        if sender.step() == Step::Drives && has_all {
+            sender.hold(connection);
+        }
+        sender.step() == Step::Drives && connection.status().is_some_and(|status| status.state == State::Held)
+    })
+    .expect("no fault");
+    drop(connection);
+    let mut connection = connect(address, 2);
+    let continued = Permissions { found: Found::Continued, ..ENABLES };
+    assert_eq!(drive(&job, continued, &mut connection, |_, _, _| false).expect("driven"), Step::Done);
+    assert_eq!(stands(&connection), end(&job));
+}
+
 /// A program that is read and planned while it is driven: given up in the middle, gone on with by another sender; and one
 /// with a line at fault, which ends at rest before that line.
 #[test]
@@ -286,6 +308,22 @@ fn a_program_is_planned_while_it_is_driven() {
     // Each item once, and the end.
     let taken = connection.status().map(|status| status.taken);
     assert_eq!(taken, Some(whole.items.len() as u32 + 1));
+
+    // In the middle of a stretch, by a move that the machine can't make.
+    let mut narrow = machine.clone();
+    narrow.axes[0].travel_mm = Some([-1.0, 100.0]);
+    let source = Source {
+        name: "part.ngc".to_owned(),
+        text: b"G21 G90 G64 P0.05\nG1 X1 F3000\nX2 Y1\nX200\nX300\nM2\n".to_vec(),
+        options: ReadOptions::default(),
+        leaves_out_outputs: false,
+    };
+    let beyond = InPlanning::begin::<f32, 3>(source, &narrow);
+    let refused =
+        drive_sender(Sender::planned(&job, beyond, &names, ENABLES), &mut connection, |_, _, _| false);
+    let Err(BoardError::Program(error)) = refused else { panic!("{refused:?}") };
+    assert!(error.to_string().starts_with("part.ngc:4:"), "{error}");
+    assert!(stands(&connection)[0].to_mm() <= 2.1, "{:?}", stands(&connection));
 
     let wrong = text.replace("M2", "G1 X0 Y0\nG1 X5 Q");
     let sender = Sender::planned(&job, planned(&wrong), &names, ENABLES);

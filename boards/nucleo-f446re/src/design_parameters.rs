@@ -198,9 +198,9 @@ const _: () = assert!(
 );
 const _: () = assert!(TICK_HZ.is_multiple_of(1000), "the link counts whole milliseconds");
 
-/// Ticks that the flight recorder keeps: an eighteenth of a second, 19 KB, what the stack leaves; with the link, which needs
-/// some of it, a twentieth.
-pub const FLIGHT_ROWS: usize = TICK_HZ as usize / if cfg!(feature = "link") { 20 } else { 18 };
+/// Ticks that the flight recorder keeps: a twentieth of a second, 17 KB, what the stack leaves; with the link, which needs
+/// some of it, a twenty-second.
+pub const FLIGHT_ROWS: usize = TICK_HZ as usize / if cfg!(feature = "link") { 22 } else { 20 };
 /// Ticks of these after the fault's: 25 ms, which show the axes coasting.
 pub const FLIGHT_AFTER: usize = TICK_HZ as usize / 40;
 

@@ -1,5 +1,6 @@
 //! The items of a job: all there, or planned while it is driven.
 
+use std::cell::Cell;
 use std::collections::VecDeque;
 use std::error::Error;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
@@ -31,7 +32,7 @@ enum Planned<const M: usize> {
 /// The items, in their order.
 pub(super) enum Items<'a, const M: usize> {
     Whole { items: &'a [Item<M>], next: usize },
-    Planned(InPlanning<M>),
+    Planned(Box<InPlanning<M>>),
 }
 
 /// A program that is read and planned while it is driven.
@@ -40,7 +41,9 @@ pub struct InPlanning<const M: usize> {
     planned: Receiver<Planned<M>>,
     /// The next item, once it is there; at the end, nothing.
     next: Option<Option<Item<M>>>,
-    failed: Option<Box<dyn Error + Send + Sync>>,
+    failed: Option<BoardError>,
+    /// The last item that was taken is of a stretch that does not end.
+    is_in_stretch: bool,
     /// Items before the next one, and the program lines of the latest of them; 0: of no piece of path.
     taken: usize,
     lines: VecDeque<u32>,
@@ -99,6 +102,7 @@ impl<const M: usize> InPlanning<M> {
             planned,
             next: None,
             failed: None,
+            is_in_stretch: false,
             taken: 0,
             lines: VecDeque::new(),
             here: vec![Position::ZERO; M],
@@ -118,10 +122,10 @@ impl<const M: usize> InPlanning<M> {
                 }
                 Ok(Planned::Note(note)) => self.said.push(Said::Note(note)),
                 Ok(Planned::End) => self.next = Some(None),
-                Ok(Planned::Failed(error)) => (self.failed, self.next) = (Some(error), Some(None)),
+                Ok(Planned::Failed(error)) => self.fail(BoardError::Program(error)),
                 Err(TryRecvError::Empty) => break,
                 Err(TryRecvError::Disconnected) => {
-                    (self.failed, self.next) = (Some("planning has ended".into()), Some(None));
+                    self.fail(BoardError::Program("planning has ended".into()));
                 }
             }
         }
@@ -132,8 +136,14 @@ impl<const M: usize> InPlanning<M> {
         }
     }
 
+    fn fail(&mut self, error: BoardError) {
+        (self.failed, self.next) = (Some(error), Some(None));
+    }
+
     fn advance(&mut self) {
         let Some(Some(item)) = self.next.take_if(|next| next.is_some()) else { return };
+        self.is_in_stretch =
+            matches!(item, Item::Block(_) | Item::Feed(_) | Item::Line { .. } | Item::Septic { .. });
         self.taken += 1;
         self.lines.push_back(piece(&item).map_or(0, |(line, _)| line));
         if self.lines.len() > LINES {
@@ -158,10 +168,10 @@ fn plan<R: Real, const N: usize, const M: usize>(
 ) -> Result<(), Box<dyn Error + Send + Sync>> {
     let mut reading = Reading::new(&source.name, &source.text, &source.options);
     let mut stream = Stream::<R, N>::new(&source.name, machine);
-    let (mut is_listened_to, mut is_path_programmed) = (true, false);
+    let (is_listened_to, mut is_path_programmed) = (Cell::new(true), false);
     let mut put = |streamed: Streamed<N>| {
         let item = Planned::Item(first_axes(&streamed.item), streamed.stop);
-        is_listened_to = is_listened_to && to.send(item).is_ok();
+        is_listened_to.set(is_listened_to.get() && to.send(item).is_ok());
     };
     loop {
         let batch = match reading.next_batch() {
@@ -183,6 +193,9 @@ fn plan<R: Real, const N: usize, const M: usize>(
             return Err(error.into());
         }
         stream.take(&batch, &mut put)?;
+        if !is_listened_to.get() {
+            return Ok(());
+        }
     }
     stream.finish(&mut put)?;
     for note in reading.into_program().iter().flat_map(|program| notes(program, machine)) {
@@ -245,13 +258,33 @@ impl<const M: usize> Items<'_, M> {
     pub(super) fn take_failure(&mut self) -> Option<BoardError> {
         match self {
             Self::Whole { .. } => None,
-            Self::Planned(planned) => planned.failed.take().map(BoardError::Program),
+            Self::Planned(planned) => planned.failed.take(),
+        }
+    }
+
+    /// There are no more, because the next one can't be driven.
+    pub(super) fn fail(&mut self, error: BoardError) {
+        if let Self::Planned(planned) = self {
+            planned.fail(error);
+        }
+    }
+
+    /// Whether what was taken ends in the middle of a stretch.
+    pub(super) fn is_in_stretch(&self) -> bool {
+        matches!(self, Self::Planned(planned) if planned.is_in_stretch)
+    }
+
+    /// The line of the last piece of path that was taken.
+    pub(super) fn last_line(&self) -> u32 {
+        match self {
+            Self::Whole { .. } => 0,
+            Self::Planned(planned) => planned.lines.iter().rev().copied().find(|&line| line > 0).unwrap_or(0),
         }
     }
 
     /// Whether there is such a reason.
     pub(super) fn has_failed(&self) -> bool {
-        matches!(self, Self::Planned(InPlanning { failed: Some(_), .. }))
+        matches!(self, Self::Planned(planned) if planned.failed.is_some())
     }
 
     /// What the program has said since the last call.

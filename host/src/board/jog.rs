@@ -45,6 +45,7 @@ impl<const N: usize, const M: usize> Jogs<'_, N, M> {
         let mut sender = Sender::new(self.job, self.axes, self.may).jogs(&jog, self.dead_man_ms);
         let mut seen: Option<Seen<M>> = None;
         let mut released: Option<Status<M>> = None;
+        let mut is_held = false;
         loop {
             let mut heard = Vec::new();
             connection.step(Duration::from_millis(2), &mut |one| heard.push(one));
@@ -70,7 +71,11 @@ impl<const N: usize, const M: usize> Jogs<'_, N, M> {
                 let moving = connection.status().filter(|status| status.state == State::Moving);
                 let is_due = seen.as_ref().zip(moving).is_some_and(|(seen, status)| is_due(seen, status));
                 // Before it moves, too.
-                if is_released() || is_due {
+                let by_itself = connection.status().is_some_and(|status| status.state == State::Held);
+                if by_itself && seen.is_some() {
+                    is_held = true;
+                    sender.abort(connection);
+                } else if is_released() || is_due {
                     released = connection.status().copied();
                     sender.abort(connection);
                 }
@@ -81,6 +86,10 @@ impl<const N: usize, const M: usize> Jogs<'_, N, M> {
                 seen = Some(Seen::new(before));
             }
             if matches!(step, Step::Done | Step::Aborted) {
+                if is_held {
+                    let told = "the board held by itself: it heard nothing for the dead man's time";
+                    return Err(BoardError::Wire(std::io::Error::other(told)));
+                }
                 let Some(status) = connection.status().copied() else { continue };
                 let seen = seen.unwrap_or_else(|| Seen::new(status));
                 let ended = match released {

@@ -113,7 +113,7 @@ impl<'a, const M: usize> Sender<'a, M> {
     /// The same of a job whose items are planned while they are driven.
     #[must_use]
     pub fn planned(job: &'a Job<M>, planned: InPlanning<M>, axes: &'a [String], may: Permissions) -> Self {
-        Self::of(job, Items::Planned(planned), axes, may)
+        Self::of(job, Items::Planned(Box::new(planned)), axes, may)
     }
 
     fn of(job: &'a Job<M>, items: Items<'a, M>, axes: &'a [String], may: Permissions) -> Self {
@@ -257,6 +257,9 @@ impl<'a, const M: usize> Sender<'a, M> {
                 self.approach(&status, connection)?;
             }
             Step::Aborts if matches!(status.state, State::Held | State::Idle | State::Off) => {
+                if let Some(error) = self.items.take_failure() {
+                    return Err(error);
+                }
                 self.go(Step::Aborted);
             }
             Step::ToStart | Step::Drives => self.drive(&status, connection)?,
@@ -387,9 +390,14 @@ impl<'a, const M: usize> Sender<'a, M> {
             _ => {}
         }
         self.push(connection)?;
-        let is_at_rest = matches!(status.state, State::Starved | State::Idle) && connection.has_all();
-        if self.is_ended && is_at_rest && self.step == Step::Drives && self.items.has_failed() {
-            return self.items.take_failure().map_or(Ok(()), Err);
+        if self.is_ended && self.step == Step::Drives && self.items.has_failed() {
+            if self.items.is_in_stretch() {
+                // What the board has of it does not end.
+                self.abort(connection);
+            } else if status.state == State::Idle && connection.has_all() {
+                return self.items.take_failure().map_or(Ok(()), Err);
+            }
+            return Ok(());
         }
         if self.is_ended && connection.is_driven() {
             if self.step == Step::ToStart && self.jog.is_none() {
@@ -425,12 +433,19 @@ impl<'a, const M: usize> Sender<'a, M> {
                     if let Some((found, has)) =
                         has.and_then(|has| Some((self.outputs.check(item, has)?, has)))
                     {
-                        return Err(self.lacks_output(found, has));
+                        // It is at rest there.
+                        let (program, line) = (self.items.name().to_owned(), self.items.last_line());
+                        self.items.fail(BoardError::Outputs { program, line, found, has });
+                        continue;
                     }
                     if !connection.push(Some(item)).map_err(BoardError::Push)? {
                         return Ok(());
                     }
                     self.outputs.pass(item);
+                }
+                Next::End if self.skips > 0 => {
+                    // The board has the end, too.
+                    (self.skips, self.is_ended) = (0, true);
                 }
                 Next::End => {
                     if !connection.push(None).map_err(BoardError::Push)? {
@@ -445,11 +460,6 @@ impl<'a, const M: usize> Sender<'a, M> {
             }
         }
         Ok(())
-    }
-
-    fn lacks_output(&self, found: &'static str, has: BoardOutputs) -> BoardError {
-        let line = self.of_job(self.pushed as u32).and_then(|item| self.items.line_of(item));
-        BoardError::Outputs { program: self.items.name().to_owned(), line: line.unwrap_or(0), found, has }
     }
 
     /// All is driven.

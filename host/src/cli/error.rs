@@ -217,7 +217,7 @@ pub enum CliError {
         source: BoardError,
     },
     /// A program that is planned while it is driven can't be read or planned to its end.
-    #[error("{0}; what was before that line is driven")]
+    #[error("{0}; nothing behind that place is driven")]
     Program(Box<dyn std::error::Error + Send + Sync>),
     /// A board can't take connections there.
     #[error("--listen {address}: found {source}, expected an address of this computer that is free")]

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -229,17 +229,18 @@ pub(super) struct Scoped<const N: usize> {
 }
 
 impl ScopeArguments {
-    /// Starts the scope, if it is asked for, before the first item is sent. `info` names the board's axes.
+    /// Starts the scope, if it is asked for, before the first item is sent. No file of `inputs` is replaced. `info` names the board's axes.
     ///
     /// # Errors
     /// The file can't be written, there is no axis of the trigger's name, or the board does not answer.
     pub(super) fn start<const N: usize>(
         &self,
+        inputs: &[(&'static str, Option<&Path>)],
         info: &RunInfo,
         port: &PortArguments,
         connection: &mut Connection<N>,
     ) -> Result<Option<Scoped<N>>, CliError> {
-        let mut files = Files::reading([]);
+        let mut files = Files::reading(inputs.iter().copied());
         let Some(output) = outputs::open(&mut files, "--scope", self.scope.as_ref())? else {
             return Ok(None);
         };

@@ -13,6 +13,7 @@ use super::port::PortArguments;
 use super::scope::ScopeArguments;
 use super::send::{greet, state_words};
 use crate::board::{BoardError, Connection, Heard, Scope};
+use crate::files::interrupt;
 use crate::gcode::Axis;
 use crate::planning::on_axis_count;
 use crate::simulate::{RunInfo, SheetAxis, faults};
@@ -70,7 +71,11 @@ fn show<const M: usize>(
 ) -> Result<Outcome, CliError> {
     let mut connection: Connection<M> = arguments.port.open()?;
     greet(&mut connection).map_err(|error| arguments.port.refused(error))?;
-    let scoped = arguments.scope.start(&info(M, tick_s), &arguments.port, &mut connection)?;
+    let scoped = arguments.scope.start(&[], &info(M, tick_s), &arguments.port, &mut connection)?;
+    if scoped.is_some() {
+        // Its file is finished first.
+        interrupt::hold_first();
+    }
     let (begin, mut last, mut told) = (Instant::now(), None, Instant::now());
     while arguments.seconds.is_none_or(|seconds| begin.elapsed().as_secs_f64() < seconds) {
         let (mut lost, mut is_new) = (None, false);
@@ -86,7 +91,7 @@ fn show<const M: usize>(
                 writeln!(out, "the board has started anew").map_err(CliError::Output)?;
             }
         }
-        if connection.scope().is_some_and(Scope::has_failed) {
+        if connection.scope().is_some_and(Scope::has_failed) || interrupt::take_asked().is_some() {
             break;
         }
         if let Some(cause) = lost {

@@ -75,6 +75,11 @@ impl LookAhead {
         }
     }
 
+    /// Blocks that are settled to their ends.
+    pub(super) fn settled_blocks(&self) -> usize {
+        self.before
+    }
+
     /// The path goes on with a block, which ends at `end`.
     pub(super) fn push(&mut self, block: Block<f64>, end: Position) {
         self.blocks.push(block);
@@ -158,10 +163,9 @@ impl LookAhead {
             let (end, is_rise) = (start + *length, ramp.to_mm_s > ramp.from_mm_s);
             let is_first = index == 0;
             if ramp.is_cruise() && self.is_ceiling(start, ramp.from_mm_s) {
-                let within =
-                    self.ends.iter().rev().find(|&&block| block < end).filter(|&&block| block > start);
+                let within = self.level_to(start, end, ramp.from_mm_s);
                 if !is_first || within.is_some() {
-                    found = Some((index, within.copied()));
+                    found = Some((index, within));
                 }
             } else if is_rise && fell && !is_first {
                 found = Some((index, None));
@@ -170,6 +174,13 @@ impl LookAhead {
             start = end;
         }
         found
+    }
+
+    /// The last end of a block within a cruise up to which no block allows more.
+    fn level_to(&self, start: Position, end: Position, feed_mm_s: f64) -> Option<Position> {
+        let blocks = self.blocks.iter().zip(&self.ends).skip(block_at(&self.ends, start));
+        let level = blocks.take_while(|&(block, &at)| at < end && feed_mm_s >= block.cap_mm_s * CEILING);
+        level.map(|(_, &at)| at).last().filter(|&at| at > start)
     }
 
     /// Whether nothing on the block at a place is faster.

@@ -46,7 +46,7 @@ pub(super) enum Part<const N: usize> {
         goes_on: bool,
     },
     /// A probing move; its motion is the next part, unless it stands.
-    Probe { line: u32, probe: ProbeMove },
+    Probe { line: u32, probe: Box<ProbeMove> },
     /// Rest.
     Dwell { line: u32, seconds: f64 },
     /// Spindle and coolant switch.
@@ -158,7 +158,7 @@ impl<'m, const N: usize> Runs<'m, N> {
                 self.stop();
                 let ProbeMove { from, to, end, feed, .. } = *probe;
                 travel::check_end(end, machine).map_err(at)?;
-                self.parts.push(Part::Probe { line, probe: *probe });
+                self.parts.push(Part::Probe { line, probe: Box::new(*probe) });
                 if from != to {
                     let to = LineMove { from, to, feed, mode: PathMode::ExactStop };
                     self.go([path_move(Element::line(&to, machine), feed, to.mode)]);
@@ -259,8 +259,9 @@ impl<'m, const N: usize> Runs<'m, N> {
         let moves = &self.run[first..end];
         let from = moves.iter().map(|step| step.element.ends_mm().0);
         let points: Vec<_> = from.chain(moves.last().map(|step| step.element.ends_mm().1)).collect();
-        let parts =
-            if moves.len() > 1 { merge(&points, AROUND_SHARE * step.tolerance_mm) } else { Vec::new() };
+        let most_mm = AROUND_SHARE * step.tolerance_mm;
+        let most_mm = step.merging_mm.map_or(most_mm, |merging_mm| merging_mm.min(most_mm));
+        let parts = if moves.len() > 1 { merge(&points, most_mm) } else { Vec::new() };
         let ends = parts.iter().skip(1).map(|part| part.first).chain([moves.len()]);
         let longest = parts
             .iter()
@@ -274,7 +275,8 @@ impl<'m, const N: usize> Runs<'m, N> {
         };
         let feeds = self.run[stands_for.clone()].iter().map(|step| step.feeds).reduce(Feeds::least);
         let tolerance_mm = (step.tolerance_mm - distance_mm) * HALF;
-        (Move { element, tolerance_mm, feeds: feeds.unwrap_or(step.feeds), ..step }, stands_for)
+        let line = self.run[stands_for.start].line;
+        (Move { line, element, tolerance_mm, feeds: feeds.unwrap_or(step.feeds), ..step }, stands_for)
     }
 
     fn end_section(&mut self, rest: Vec<Move<N>>) {

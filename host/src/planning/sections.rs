@@ -28,7 +28,7 @@ pub(super) enum Smoothed<const N: usize> {
 const MOVES_MIN: usize = 32;
 
 /// Parts that are smoothed together at most: what waits meanwhile is bounded.
-pub(super) const TOGETHER: usize = 16;
+pub(super) const TOGETHER: usize = 4;
 
 /// Smooths parts, in their order. An error comes with the program line; it ends the parts.
 pub(super) fn smoothed<const N: usize>(

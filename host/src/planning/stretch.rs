@@ -148,6 +148,8 @@ impl<'m, const N: usize> Growing<'m, N> {
     ) -> Result<(), (u32, Problem)> {
         let settled = self.ahead.settle(goes_on, &mut self.ramps);
         settled.map_err(|(block, problem)| (self.line_of(block), problem))?;
+        let done = self.lines.partition_point(|&(first, _)| first <= self.ahead.settled_blocks());
+        self.lines.drain(..done.saturating_sub(1));
         self.ramps.drain(..).try_for_each(|ramp| known(Known::Ramp(ramp)))
     }
 

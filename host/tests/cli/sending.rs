@@ -101,7 +101,7 @@ fn a_program_is_driven_while_it_is_read() {
     let (status, out, error) = outcome(workspace.command(&send).args(["--restart", "--json"]));
     assert_eq!(status, Some(2), "{out} {error}");
     assert!(
-        error.contains("wrong.ngc:405:") && error.contains("what was before that line is driven"),
+        error.contains("wrong.ngc:405:") && error.contains("nothing behind that place is driven"),
         "{error}"
     );
     let last: Value = serde_json::from_str(out.lines().last().expect("a line")).expect("JSON");

@@ -226,10 +226,12 @@ impl BoardLink {
             Request::Hello { asker } => {
                 if asker != self.asker {
                     self.scope = None;
+                    if self.controls.dead_man_ms > 0 {
+                        // Who held the key is not there any more. The other one adopts the hold.
+                        (self.controls.mode, self.is_changed) = (Mode::Hold, true);
+                    }
                 }
-                self.asker = asker;
-                // Another one may read what the one before could not make.
-                (self.is_welcome_due, self.is_unreadable) = (true, false);
+                (self.asker, self.is_welcome_due) = (asker, true);
             }
             // Of another start, or of somebody who was replaced: the answer tells.
             Request::Controls { session, asker, .. }

@@ -122,6 +122,20 @@ pub(super) struct Journal {
     records: Option<Sender<Record>>,
     writer: Option<JoinHandle<Result<(), FilesError>>>,
     record: Record,
+    /// Where the one before was moved.
+    kept: Option<PathBuf>,
+}
+
+/// Moves the journal of another program that was not driven to its end; where to.
+fn keep(path: &Path, subject: &Subject) -> Result<Option<PathBuf>, CliError> {
+    let is_open = |before: Record| !before.is_finished && before.job != subject.job;
+    if !path.exists() || !Record::read(path).is_ok_and(is_open) {
+        return Ok(None);
+    }
+    let kept = path.with_extension("before");
+    let refused = |source| CliError::Folder { path: kept.display().to_string(), source };
+    fs::rename(path, &kept).map_err(refused)?;
+    Ok(Some(kept))
 }
 
 impl Journal {
@@ -158,6 +172,10 @@ impl Journal {
                 return Err(CliError::NoJournal { path: name() });
             }
         }
+        let kept = match &arguments.journal {
+            None => keep(&path, subject)?,
+            Some(_) => None,
+        };
         // Found before anything moves, as for every output; nothing is written yet.
         let inputs =
             [("the program", Some(arguments.program.as_path())), ("--machine", arguments.machine.as_deref())];
@@ -168,7 +186,13 @@ impl Journal {
             records: Some(records),
             writer: Some(writer),
             record: Record::new(arguments, subject),
+            kept,
         }))
+    }
+
+    /// Where the journal of another program that is not at its end was moved; told once.
+    pub(super) fn take_kept(&mut self) -> Option<PathBuf> {
+        self.kept.take()
     }
 
     /// Motion has come so far.

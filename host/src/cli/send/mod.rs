@@ -7,7 +7,7 @@ mod shown;
 mod stops;
 
 use std::io::{self, BufRead, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -111,8 +111,9 @@ pub struct SendArguments {
     /// Give up what the board has of a program.
     #[arg(long)]
     restart: bool,
-    /// Begin at once: the program is read and planned while it is driven. A line at fault ends the motion at rest before it.
-    /// Without this, all of it is planned before anything moves.
+    /// Begin at once: the program is read and planned while it is driven. A line that can't be read ends the motion at rest before
+    /// it; one that can't be driven, such as beyond the travel, aborts the program before it. Between G41 or G42 and G40 nothing
+    /// is known to be final. Without this option all is planned before anything moves.
     #[arg(long, conflicts_with = "from_line")]
     stream: bool,
     /// Leave out the words of spindle and coolant that the machine has no output for.
@@ -246,6 +247,17 @@ fn stream_job<R: Root + Send, const N: usize, const M: usize>(
         lines,
     };
     drive(arguments, driven, machine, connection, out)
+}
+
+/// The files that no output may replace.
+fn inputs(arguments: &SendArguments) -> [(&'static str, Option<&Path>); 5] {
+    [
+        ("the program", Some(arguments.program.as_path())),
+        ("--machine", arguments.machine.as_deref()),
+        ("--parameters", arguments.reading.parameters.as_deref()),
+        ("--tools", arguments.reading.tools.as_deref()),
+        ("--journal", arguments.journal.as_deref()),
+    ]
 }
 
 /// What is to become of a program that the board has already.
@@ -440,7 +452,7 @@ fn drive<const N: usize, const M: usize>(
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
     let info = RunInfo::of_machine(machine);
-    let scoped = arguments.scope.start(&info, &arguments.port, &mut connection)?;
+    let scoped = arguments.scope.start(&inputs(arguments), &info, &arguments.port, &mut connection)?;
     let outcome = drive_to_end(arguments, driven, machine, &mut connection, out);
     match scoped {
         Some(scoped) => {
@@ -541,6 +553,13 @@ fn drive_to_end<const N: usize, const M: usize>(
         shown.show(out, step, connection)?;
         if let Some(journal) = &mut journal {
             note(journal, &mut progress, &sender, connection, names.len());
+        }
+        if let Some(kept) = journal.as_mut().and_then(Journal::take_kept) {
+            let kept = kept.display();
+            shown.say(
+                out,
+                &format!("another program was not at its end: motion resume {kept} goes on with it"),
+            )?;
         }
         if let Some(failure) = journal.as_mut().and_then(Journal::failure) {
             shown.say(out, &format!("the journal is not written any more: {failure}"))?;
