@@ -45,7 +45,7 @@ impl<const N: usize, const M: usize> Jogs<'_, N, M> {
         let mut sender = Sender::new(self.job, self.axes, self.may).jogs(&jog, self.dead_man_ms);
         let mut seen: Option<Seen<M>> = None;
         let mut released: Option<Status<M>> = None;
-        let mut is_held = false;
+        let (mut has_moved, mut is_held) = (false, false);
         loop {
             let mut heard = Vec::new();
             connection.step(Duration::from_millis(2), &mut |one| heard.push(one));
@@ -58,6 +58,7 @@ impl<const N: usize, const M: usize> Jogs<'_, N, M> {
                     }
                     Heard::Board(Event::Status(status)) => {
                         if let Some(seen) = &mut seen {
+                            has_moved |= status.state == State::Moving;
                             seen.see(status);
                         }
                     }
@@ -72,7 +73,8 @@ impl<const N: usize, const M: usize> Jogs<'_, N, M> {
                 let is_due = seen.as_ref().zip(moving).is_some_and(|(seen, status)| is_due(seen, status));
                 // Before it moves, too.
                 let by_itself = connection.status().is_some_and(|status| status.state == State::Held);
-                if by_itself && seen.is_some() {
+                // Before it moves, it is held from the press before.
+                if by_itself && has_moved {
                     is_held = true;
                     sender.abort(connection);
                 } else if is_released() || is_due {
