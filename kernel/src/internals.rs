@@ -18,6 +18,4 @@ pub use crate::queue::density::Density;
 pub use crate::queue::item::FeedItem;
 #[cfg(all(feature = "live", feature = "watch"))]
 pub use crate::queue::watch::Access;
-pub use crate::work::add as add_work;
-#[cfg(feature = "count-work")]
-pub use crate::work::work_done;
+pub use crate::work::{add as add_work, work_done};

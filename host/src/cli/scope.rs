@@ -17,6 +17,7 @@ use crate::board::scope::{Scope, ScopeSummary, Ticks};
 use crate::board::{BoardError, Connection, parameters};
 use crate::files::{Failure, Files, OutputFile};
 use crate::simulate::RunInfo;
+use crate::simulate::run::state_names;
 use crate::trace::{AxisTick, TraceRow};
 
 /// The last ticks come within this time.
@@ -130,7 +131,13 @@ impl FromStr for Condition {
         let quantity = Quantity::of(column).ok_or_else(refused)?;
         let number = || rest.parse::<f64>().ok().filter(|number| number.is_finite()).ok_or_else(refused);
         let is = match (&quantity, &text[at..=at]) {
-            (Quantity::State, "=") if !rest.is_empty() => Is::Named(rest.to_owned()),
+            (Quantity::State, "=") if state_names().contains(&rest) => Is::Named(rest.to_owned()),
+            (Quantity::State, "=") => {
+                return Err(format!(
+                    "found `{text}`, expected state= and one of {}",
+                    state_names().join(", ")
+                ));
+            }
             (Quantity::Path(_) | Quantity::Axis(..), ">") => Is::Above(number()?),
             (Quantity::Path(_) | Quantity::Axis(..), "<") => Is::Below(number()?),
             _ => return Err(refused()),
@@ -311,15 +318,34 @@ impl<const N: usize> Scoped<N> {
             told(&summary, trigger.is_some().then_some(triggers), out).map_err(CliError::Output)?;
             written.say(out)?;
         }
+        if is_quiet {
+            let line = json(&summary, trigger.is_some().then_some(triggers));
+            writeln!(out, "{line}").map_err(CliError::Output)?;
+        }
         let outcome = match summary.error {
             Some(error) => {
-                writeln!(out, "  scope: {error}").map_err(CliError::Output)?;
+                if !is_quiet {
+                    writeln!(out, "  scope: {error}").map_err(CliError::Output)?;
+                }
                 Outcome::Failed
             }
             None => outcome,
         };
         written.outcome(outcome)
     }
+}
+
+/// What a scope has come to, for scripts.
+fn json(summary: &ScopeSummary, triggers: Option<u64>) -> serde_json::Value {
+    serde_json::json!({ "scope": {
+        "ticks": summary.ticks,
+        "missing": summary.missing(),
+        "gaps": summary.gaps,
+        "bytes": summary.bytes,
+        "is_foreign": summary.is_foreign,
+        "triggered": triggers,
+        "error": summary.error.as_ref().map(ToString::to_string),
+    } })
 }
 
 /// What a scope has come to, in words.

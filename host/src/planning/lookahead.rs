@@ -149,7 +149,9 @@ impl LookAhead {
     fn planned(&self) -> Result<Vec<PlannedRamp>, (usize, Problem)> {
         let (mut blocks, mut ends) = (self.blocks.clone(), self.ends.clone());
         ends.iter_mut().for_each(|end| *end = *end - self.settled);
-        if let (Some(first), Some(end)) = (blocks.first_mut(), ends.first()) {
+        if self.settled > Position::ZERO
+            && let (Some(first), Some(end)) = (blocks.first_mut(), ends.first())
+        {
             // The part of it that is left.
             first.length_mm = first.length_mm.min(end.to_mm());
         }

@@ -76,15 +76,15 @@ impl<'m, const N: usize> Pipeline<'m, N> {
 
     /// Behind the last step.
     pub(super) fn finish(&mut self, out: &mut Out<'_, N>) -> AtLine<()> {
-        let spline = self.runs.end_spline();
-        self.end(out)?;
-        spline
+        self.end(out)
     }
 
     /// What was taken comes out, to rest.
     pub(super) fn end(&mut self, out: &mut Out<'_, N>) -> AtLine<()> {
+        let spline = self.runs.end_spline();
         self.runs.stop();
-        self.advance(out)
+        self.advance(out)?;
+        spline
     }
 
     fn advance(&mut self, out: &mut Out<'_, N>) -> AtLine<()> {

@@ -3,8 +3,8 @@
 //! **Sections.** A run without a stop may be as long as the program. It is cut into sections, each of which is smoothed by
 //! itself, so that motion begins before all is planned, and in bounded memory. Where it is cut depends on the moves alone.
 //! A cut is in the middle of a straight move or an arc, the longest of the later half: nothing steps there, and blends
-//! take at most half of a move anyhow. Where moves are short, one stands for several, so that its direction is that of the
-//! path.
+//! take at most half of a move anyhow. A move of exact path is not divided: the cut is at its end. Where moves are short, one
+//! stands for several, so that its direction is that of the path.
 
 use std::mem::take;
 use std::ops::Range;
@@ -239,7 +239,17 @@ impl<'m, const N: usize> Runs<'m, N> {
             let rest = self.run.split_off(last);
             return self.end_section(rest);
         };
+        if self.run[index].tolerance_mm == 0.0 {
+            // Its end is exact anyhow.
+            let rest = self.run.split_off(index + 1);
+            return self.end_section(rest);
+        }
         let (whole, stands_for) = self.around(index, last);
+        if self.time_s(&whole) < 2.0 * self.machine.tick_s {
+            // Its halves would be two pieces where a tick has hardly room for one.
+            let rest = self.run.split_off(last);
+            return self.end_section(rest);
+        }
         let [first_half, other_half] = whole.element.split(0.5);
         let mut rest = self.run.split_off(stands_for.end);
         rest.insert(0, Move { element: other_half, ..whole });

@@ -244,6 +244,14 @@ pub(crate) fn trace_row<R: Real, const N: usize>(
     }
 }
 
+/// All names of states.
+pub(crate) fn state_names() -> [&'static str; 6] {
+    use ExecState::{Dwell, Held, Idle, Moving, Stopped};
+    let [idle, moving, dwell, stopped, held] =
+        [Idle, Moving, Dwell, Stopped, Held].map(|state| state_name(state, false));
+    [idle, moving, dwell, stopped, held, state_name(Idle, true)]
+}
+
 /// What records call a state.
 pub(crate) fn state_name(state: ExecState, is_faulted: bool) -> &'static str {
     if is_faulted {

@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 use std::time::Duration;
 
 use motion_kernel::hal::{OutputState, Spindle};
-use motion_kernel::link::Event;
+use motion_kernel::link::{Event, State, Status};
 use motion_kernel::program::Item;
 use motion_kernel::units::Position;
 
@@ -36,7 +36,9 @@ impl Middle {
         shown: &Shown<'_>,
         out: &mut dyn Write,
     ) -> Result<Option<Outcome>, CliError> {
-        let mut is_told = false;
+        // Where it was told that the machine stands.
+        let mut told: Option<[Position; M]> = None;
+        let mut is_waiting_told = false;
         loop {
             // What is confirmed is for this board, as it is now.
             let mut changed = None;
@@ -51,13 +53,30 @@ impl Middle {
             if let Some(changed) = changed {
                 return Err(port.refused(changed));
             }
-            if let Some(status) = connection.status()
-                && !std::mem::replace(&mut is_told, true)
+            // After a crash of the PC a board still drives what it has.
+            let rests = |status: &&Status<M>| !matches!(status.state, State::Moving | State::Dwell);
+            let here = connection.status().filter(rests).map(|status| status.set);
+            if connection.status().is_some() && here.is_none() && !is_waiting_told {
+                is_waiting_told = true;
+                shown.say(out, "the board still moves: this waits until it rests")?;
+            }
+            let has_moved = told.zip(here).is_some_and(|(told, here)| is_elsewhere(&told, &here));
+            if let Some(here) = here
+                && (told.is_none() || has_moved)
             {
-                for line in self.lines(job, &status.set, shown.axes()) {
+                if has_moved {
+                    shown.tell(out, "the machine has moved since")?;
+                }
+                told = Some(here);
+                for line in self.lines(job, &here, shown.axes()) {
                     shown.tell(out, &line)?;
                 }
+                // What was typed before was about something else.
+                if has_moved {
+                    while matches!(keys.try_recv(), Ok(Typed::Key(_))) {}
+                }
             }
+            let is_told = told.is_some() && here.is_some();
             if is_told && self.is_confirmed {
                 return Ok(None);
             }
@@ -105,6 +124,12 @@ impl Middle {
         }
         lines
     }
+}
+
+/// Whether a machine has moved by more than drives that are off let it wander.
+fn is_elsewhere<const M: usize>(told: &[Position; M], here: &[Position; M]) -> bool {
+    const WANDERS_MM: f64 = 0.01;
+    told.iter().zip(here).any(|(&told, &here)| (here - told).to_mm().abs() > WANDERS_MM)
 }
 
 /// What spindle and coolant do.

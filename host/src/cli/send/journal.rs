@@ -5,7 +5,8 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
@@ -121,6 +122,7 @@ pub(super) fn default_path(port: &Port) -> Option<PathBuf> {
 pub(super) struct Journal {
     records: Option<Sender<Record>>,
     writer: Option<JoinHandle<Result<(), FilesError>>>,
+    failure: Arc<Mutex<Option<String>>>,
     record: Record,
     /// Where the one before was moved.
     kept: Option<PathBuf>,
@@ -180,11 +182,13 @@ impl Journal {
         let inputs =
             [("the program", Some(arguments.program.as_path())), ("--machine", arguments.machine.as_deref())];
         Files::reading(inputs).output("--journal", &path)?;
-        let (records, to_write) = channel();
-        let writer = thread::spawn(move || write(&path, &to_write));
+        let ((records, to_write), failure) = (channel(), Arc::new(Mutex::new(None)));
+        let of_writer = Arc::clone(&failure);
+        let writer = thread::spawn(move || write(&path, &to_write, &of_writer));
         Ok(Some(Self {
             records: Some(records),
             writer: Some(writer),
+            failure,
             record: Record::new(arguments, subject),
             kept,
         }))
@@ -216,10 +220,9 @@ impl Journal {
         }
     }
 
-    /// Why nothing is written any more; told once.
-    pub(super) fn failure(&mut self) -> Option<FilesError> {
-        let writer = self.writer.take_if(|writer| writer.is_finished())?;
-        writer.join().ok()?.err()
+    /// Why it could not be written, since the last call. It is tried again.
+    pub(super) fn failure(&self) -> Option<String> {
+        self.failure.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
     /// Waits until the last record is written.
@@ -237,17 +240,35 @@ impl Drop for Journal {
     }
 }
 
-/// Writes the newest of `records` until there are no more.
-fn write(path: &Path, records: &Receiver<Record>) -> Result<(), FilesError> {
-    while let Ok(mut record) = records.recv() {
+/// Writes the newest of `records` until there are no more; what can't be written is tried again. The last result.
+fn write(path: &Path, records: &Receiver<Record>, failure: &Mutex<Option<String>>) -> Result<(), FilesError> {
+    let (mut due, mut written) = (None, Ok(()));
+    loop {
+        let next = match due {
+            Some(_) => records.recv_timeout(PERIOD),
+            None => records.recv().map_err(|_| RecvTimeoutError::Disconnected),
+        };
+        let is_end = matches!(next, Err(RecvTimeoutError::Disconnected));
+        due = next.ok().or(due);
         while let Ok(newer) = records.try_recv() {
-            record = newer;
+            due = Some(newer);
         }
-        let file = Files::reading([]).output("--journal", path)?;
-        file.write_whole(|file| serde_json::to_writer_pretty(file, &record).map_err(std::io::Error::from))?;
+        let Some(record) = &due else { return written };
+        written = put(path, record);
+        match &written {
+            Ok(()) => due = None,
+            Err(error) => *failure.lock().unwrap_or_else(PoisonError::into_inner) = Some(error.to_string()),
+        }
+        if is_end {
+            return written;
+        }
         thread::sleep(PERIOD);
     }
-    Ok(())
+}
+
+fn put(path: &Path, record: &Record) -> Result<(), FilesError> {
+    let file = Files::reading([]).output("--journal", path)?;
+    file.write_whole(|file| serde_json::to_writer_pretty(file, record).map_err(std::io::Error::from))
 }
 
 #[cfg(test)]

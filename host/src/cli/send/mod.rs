@@ -561,8 +561,8 @@ fn drive_to_end<const N: usize, const M: usize>(
                 &format!("another program was not at its end: motion resume {kept} goes on with it"),
             )?;
         }
-        if let Some(failure) = journal.as_mut().and_then(Journal::failure) {
-            shown.say(out, &format!("the journal is not written any more: {failure}"))?;
+        if let Some(failure) = journal.as_ref().and_then(Journal::failure) {
+            shown.say(out, &format!("the journal is not written: {failure}"))?;
         }
         match step {
             Step::Done => {
