@@ -11,19 +11,10 @@ use motion_host::planning::{Executable, Mode, plan_program};
 use motion_kernel::hal::{OutputState, Spindle};
 use motion_kernel::program::{Item, check_live};
 use motion_kernel::units::Position;
+use motion_tests::random::Random;
 
 /// Lines tried of every program.
 const LINES: u64 = 40;
-
-/// Knuth's generator of full period; its upper bits.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, count: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % count
-    }
-}
 
 /// The reference machine with spindle and coolant.
 fn machine() -> Machine {
@@ -210,9 +201,9 @@ fn the_items_from_a_line_on_are_those_of_the_whole_program() {
     for (seed, (name, text)) in (1..).zip(programs()) {
         println!("{name}: seed {seed}");
         let (program, whole) = read(&text, &machine);
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         for _ in 0..LINES {
-            let line = 1 + random.below(text.lines().count() as u64) as u32;
+            let line = 1 + random.below(text.lines().count()) as u32;
             let found = match from_line(&program, &whole.items, line) {
                 Ok(found) => found,
                 Err(error) => {

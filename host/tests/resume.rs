@@ -32,6 +32,7 @@ use motion_kernel::program::{FORMAT, Item};
 use motion_kernel::queue::LiveStreams;
 use motion_kernel::units::{Counts, DacCode, Position};
 use motion_tests::check::planned;
+use motion_tests::random::Random;
 use rtic_core::Exclusive;
 
 /// Programs with power cuts, one or two, on each of two machines.
@@ -40,16 +41,6 @@ const CUTS: u64 = 30;
 const STEP_TICKS: u32 = 8;
 /// Of the board's clock in a tick, so that it tells its status in each.
 const TICK_MS: u32 = 20;
-
-/// Knuth's generator of full period; its upper bits.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, count: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % count
-    }
-}
 
 /// What was switched, and in which tick.
 type Switched = Arc<Mutex<Vec<(u32, OutputState)>>>;
@@ -416,7 +407,7 @@ fn power_cuts(machine: &Machine, text: &str) {
         Item::EndOfStretch(end) => Some(*end),
         _ => None,
     });
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     let (told, _) = drive(machine, &whole, 1, None, &mut random);
     let ticks = told.len() as u64;
     let [from_mm, to_mm] = covered(&path, &told, 0);
@@ -424,12 +415,12 @@ fn power_cuts(machine: &Machine, text: &str) {
     println!("{} items, {} on the path, {ticks} ticks", whole.items.len(), path.items.len());
     let (mut repeated_mm, mut in_the_middle) = (0.0_f64, 0);
     for seed in 1..=CUTS {
-        let mut random = Random(seed);
+        let mut random = Random::new(seed);
         let (mut job, mut session, mut driven_mm, mut cuts) = (whole.clone(), 100 * seed as u32, 0.0, 0);
         loop {
             session += 1;
             // Before the program begins, too, and behind its end.
-            let until = (cuts < 1 + seed % 2).then(|| 200 + random.below(ticks * 11 / 10) as u32);
+            let until = (cuts < 1 + seed % 2).then(|| 200 + random.below(ticks as usize * 11 / 10) as u32);
             let begin = job.begin.path as usize;
             let (told, journal) = drive(machine, &job, session, until, &mut random);
             let [from_mm, to_mm] = covered(&path, &told, begin);

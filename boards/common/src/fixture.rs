@@ -116,3 +116,13 @@ impl IdealDrives {
         Self { counts: [0.0; AXES], counts_per_code, is_enabled: false, now: 0, switched: Vec::new() }
     }
 }
+
+/// Knuth's generator of full period; its upper bits. What tests of hosts draw from needs the standard library.
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn below(&mut self, count: u64) -> u64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) % count
+    }
+}

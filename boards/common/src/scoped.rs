@@ -21,7 +21,7 @@ use motion_kernel::trace::{Digest, Trace};
 use motion_kernel::units::{Counts, DacCode, Position};
 
 use crate::control::Control;
-use crate::fixture::{AXES, BOARD, PROGRAM, TICK_S, identity, machine};
+use crate::fixture::{AXES, BOARD, PROGRAM, Random, TICK_S, identity, machine};
 use crate::linked::Linked;
 use crate::machine::Machine;
 use crate::runs::to_start;
@@ -29,16 +29,6 @@ use crate::runs::to_start;
 const ITEMS: usize = 8;
 /// Ticks that have room before a poll.
 const RECORDS: usize = 128;
-
-/// Knuth's generator of full period; its upper bits.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, count: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % count
-    }
-}
 
 /// Drives without inertia, with encoders that are off by a count or two, and lines that fail where they are told to.
 struct Bench {

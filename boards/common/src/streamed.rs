@@ -235,23 +235,13 @@ mod tests {
     use motion_kernel::straight::Straight;
 
     use super::*;
-    use crate::fixture::{AXES, end, identity, machine};
+    use crate::fixture::{AXES, Random, end, identity, machine};
 
     const ITEMS: usize = 8;
     /// Few, so that a board has far less than the program.
     const PIECES: usize = 20;
     /// How often the stringer is driven: many more items than there is room for.
     const ROUNDS: usize = 5;
-
-    /// Knuth's generator of full period; its upper bits.
-    struct Random(u64);
-
-    impl Random {
-        fn below(&mut self, count: u64) -> u64 {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 33) % count
-        }
-    }
 
     /// The stringer again and again, with a straight way back between.
     fn items() -> Vec<Item<AXES>> {

@@ -1,7 +1,7 @@
 //! `send`, `watch`, `parameters` and `board` as commands: keys, statuses, JSON, refusals.
 
 use std::io::{BufRead, BufReader, Write};
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, ChildStdin, Command, Stdio};
 
 use serde_json::Value;
 
@@ -37,6 +37,14 @@ fn outcome(command: &mut Command) -> (Option<i32>, String, String) {
     let output = command.stdin(Stdio::null()).output().expect("it runs");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
     (output.status.code(), text(output.stdout), text(output.stderr))
+}
+
+/// A command that runs, its keys, and its lines as they come.
+fn typed_to(command: &mut Command) -> (Child, ChildStdin, impl Iterator<Item = String> + use<>) {
+    let mut child = command.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("a process");
+    let keys = child.stdin.take().expect("piped");
+    let lines = BufReader::new(child.stdout.take().expect("piped")).lines().map_while(Result::ok);
+    (child, keys, lines)
 }
 
 #[test]
@@ -117,14 +125,8 @@ fn a_program_is_driven_while_it_is_read() {
 fn keys_hold_resume_and_abort() {
     let workspace = Workspace::new("keys");
     workspace.put("part.ngc", STRINGER);
-    let mut child = workspace
-        .command(&["send", "part.ngc", "--port", "simulator", "--enable"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("a process");
-    let mut keys = child.stdin.take().expect("piped");
-    let lines = BufReader::new(child.stdout.take().expect("piped")).lines().map_while(Result::ok);
+    let (mut child, mut keys, lines) =
+        typed_to(&mut workspace.command(&["send", "part.ngc", "--port", "simulator", "--enable"]));
     let mut told = Vec::new();
     for line in lines {
         let key = match told.len() {
@@ -189,15 +191,7 @@ fn a_program_is_begun_at_a_line() {
     assert_eq!(status, Some(2), "{error}");
     assert!(error.starts_with("motion: part.ngc:12: found a program of 6 lines, expected"), "{error}");
     // By the key.
-    let mut child = workspace
-        .command(&send)
-        .arg("5")
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("a process");
-    let mut keys = child.stdin.take().expect("piped");
-    let lines = BufReader::new(child.stdout.take().expect("piped")).lines().map_while(Result::ok);
+    let (mut child, mut keys, lines) = typed_to(workspace.command(&send).arg("5"));
     let mut told = Vec::new();
     for line in lines {
         if line.starts_with("r with Enter confirms") {

@@ -6,10 +6,10 @@ use motion_host::toolpath::{Element, Involute, Polynomial, Role};
 use motion_kernel::num::{Fixed, Real};
 
 use super::asked::{Asked, corners, line, program};
-use super::compiled::{Compiled, compiled, continuous, distance};
+use super::compiled::{Compiled, compiled, distance};
 use super::driven::{Worst, driven};
 use super::tolerance::CHAINS;
-use super::{assert_none, norm, planned, rounded, seeds, without_path_mode};
+use super::{assert_none, judged, norm, planned, rounded, seeds, without_path_mode};
 use motion_tests::check::machine;
 use motion_tests::random::Random;
 use motion_tests::samples::SAMPLES;
@@ -38,20 +38,8 @@ fn every_tick_of_blended_programs_keeps_the_limits() {
         let asked = corners(&mut random, moves, lengths, (1e-3, 2.8));
         let tolerance = rounded(random.log(1e-3, 0.3));
         let text = program(&asked, tolerance, random.log(60.0, 12_000.0));
-        let done = || -> Result<Worst, String> {
-            let plan = planned(&text, &machine)?;
-            let stretches = compiled(&plan);
-            continuous(&stretches)?;
-            let ratio = distance(&asked, &stretches, tolerance, 24);
-            worst_distance = worst_distance.max(ratio);
-            if ratio > 1.0 + 1e-6 {
-                return Err(format!("{ratio} times the tolerance"));
-            }
-            let found = driven::<f64>(&plan, &machine)?;
-            found.check().map(|()| found)
-        }();
-        match done {
-            Ok(found) => worst = worst.max(found),
+        match judged((&asked, tolerance, &text), &machine, 24) {
+            Ok((found, ratio)) => (worst, worst_distance) = (worst.max(found), worst_distance.max(ratio)),
             Err(error) => failures.push(format!("MOTION_TEST_SEED={seed}: {error}\n{text}")),
         }
     }

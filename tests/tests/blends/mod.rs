@@ -23,6 +23,10 @@ use motion_host::machine::Machine;
 use motion_host::planning::{Mode, Plan, plan_program};
 use motion_tests::check::geometry::{Vector, dot, minus, norm};
 
+use self::asked::Asked;
+use self::compiled::{compiled, continuous, distance};
+use self::driven::{Worst, driven};
+
 fn along(a: Vector, direction: Vector, length: f64) -> Vector {
     [a[0] + direction[0] * length, a[1] + direction[1] * length, a[2] + direction[2] * length]
 }
@@ -48,6 +52,24 @@ fn without_path_mode(text: &str) -> String {
 fn planned(text: &str, machine: &Machine) -> Result<Plan, String> {
     let program = gcode::read("corners.ngc", text.as_bytes()).map_err(|error| error.to_string())?;
     plan_program("corners.ngc", &program, machine, Mode::Spanning).map_err(|error| error.to_string())
+}
+
+/// A program of `asked` moves, held against them at so many points a move, and against every limit in every tick; what its
+/// ticks came to, and its greatest distance over the tolerance.
+fn judged(
+    (asked, tolerance, text): (&[Asked], f64, &str),
+    machine: &Machine,
+    samples: usize,
+) -> Result<(Worst, f64), String> {
+    let plan = planned(text, machine)?;
+    let stretches = compiled(&plan);
+    continuous(&stretches)?;
+    let ratio = distance(asked, &stretches, tolerance, samples);
+    if ratio > 1.0 + 1e-6 {
+        return Err(format!("{ratio} times the tolerance"));
+    }
+    let found = driven::<f64>(&plan, machine)?;
+    found.check().map(|()| (found, ratio))
 }
 
 fn seeds(count: u64) -> impl Iterator<Item = u64> {

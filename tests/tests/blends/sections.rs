@@ -10,9 +10,8 @@ use motion_tests::random::Random;
 use motion_tests::samples::SAMPLES;
 
 use super::asked::{Asked, corners, program};
-use super::compiled::{compiled, continuous, distance};
-use super::driven::{Worst, driven};
-use super::{assert_none, planned, rounded, seeds};
+use super::driven::Worst;
+use super::{assert_none, judged, planned, rounded, seeds};
 
 /// Programs, by seeds; and those whose ticks are looked at, some hundred thousand each.
 const LONG: u64 = 12;
@@ -40,7 +39,7 @@ fn streamed<R: Real>(text: &str, machine: &Machine) -> Result<(Vec<Item<3>>, usi
         taken.map_err(|error| error.to_string())?;
         before = before.or((!items.is_empty()).then_some(steps));
     }
-    stream.finish(&mut |streamed| items.push(streamed.item)).map_err(|error| error.to_string())?;
+    stream.end(&mut |streamed| items.push(streamed.item)).map_err(|error| error.to_string())?;
     Ok((items, before.unwrap_or(steps)))
 }
 
@@ -98,19 +97,8 @@ fn sections_keep_limits_and_tolerance() {
         machine.path.pulse = machine::pulse(&random);
         machine.path.accel_step_mm_s2 = 1e-3;
         let (asked, tolerance, text) = long(&mut random);
-        let done = || -> Result<Worst, String> {
-            let plan = planned(&text, &machine)?;
-            let stretches = compiled(&plan);
-            continuous(&stretches)?;
-            let ratio = distance(&asked, &stretches, tolerance, 4);
-            if ratio > 1.0 + 1e-6 {
-                return Err(format!("{ratio} times the tolerance"));
-            }
-            let found = driven::<f64>(&plan, &machine)?;
-            found.check().map(|()| found)
-        }();
-        match done {
-            Ok(found) => worst = worst.max(found),
+        match judged((&asked, tolerance, &text), &machine, 4) {
+            Ok((found, _)) => worst = worst.max(found),
             Err(error) => failures.push(format!("MOTION_TEST_SEED={seed}: {error}")),
         }
     }
