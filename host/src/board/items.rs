@@ -197,7 +197,7 @@ fn plan<R: Real, const N: usize, const M: usize>(
             return Ok(());
         }
     }
-    stream.finish(&mut put)?;
+    stream.end(&mut put)?;
     for note in reading.into_program().iter().flat_map(|program| notes(program, machine)) {
         let _ = to.send(Planned::Note(note));
     }

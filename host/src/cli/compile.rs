@@ -91,9 +91,7 @@ fn compile_for<const N: usize>(
         require_outputs(source_name, &program.steps, machine)?;
     }
     let plan = plan_program(source_name, program, machine, mode)?;
-    if let Some(probe) = plan.probes.first() {
-        return Err(CliError::NoProbeInput { program: source_name.to_owned(), line: probe.line });
-    }
+    plan.refuse_probes()?;
     let executable = match arguments.number {
         Number::F32 => executable::<f32, N>(&plan, machine),
         Number::Fixed => executable::<Fixed, N>(&plan, machine),

@@ -75,14 +75,6 @@ pub enum CliError {
         /// The system's reason.
         source: io::Error,
     },
-    /// A program probes, and is to be written for a board.
-    #[error("{program}:{line}: found a probing move, expected none: a board has no probe input yet")]
-    NoProbeInput {
-        /// The program.
-        program: String,
-        /// Its line.
-        line: u32,
-    },
     /// A program can't be begun at a line.
     #[error("{program}:{line}: {source}")]
     FromLine {

@@ -29,7 +29,7 @@ use motion_kernel::plan::{
 
 use super::Mode;
 use super::ceilings::{Ceilings, along, ceilings, in_any_direction, junction_feed};
-use super::error::Problem;
+use super::error::AtLine;
 use super::lookahead::lookahead;
 use super::stretch::StretchBlock;
 use crate::machine::Machine;
@@ -59,9 +59,6 @@ const BLOCKS: usize = 2 * (2 * BESIDE + 2) - 1;
 const LOWERINGS: usize = 8;
 /// Feeds that a plan has named as just possible, made a little less.
 const LESS: f64 = 1.0 - 1.0e-9;
-
-/// An error comes with the program line.
-type AtLine<T> = Result<T, (u32, Problem)>;
 
 /// How a junction is crossed.
 #[derive(Clone, Debug, PartialEq)]

@@ -8,7 +8,7 @@
 use motion_kernel::law::{Law, LimitError, Limits};
 use motion_kernel::plan::{AxisLimits, Ceiling, Junction, MachineLimits, Reason, junction};
 
-use super::error::Problem;
+use super::error::AtLine;
 use crate::gcode::Axis;
 use crate::machine::Machine;
 use crate::toolpath::fairing::feeds::lower;
@@ -110,10 +110,7 @@ pub(super) fn in_any_direction<const N: usize>(moves: &[Move<N>], machine: &Mach
 const SMOOTH_FEED_SHARE: f64 = 0.93;
 
 /// The ceilings of the moves of a run. An error comes with the program line.
-pub(super) fn along<const N: usize>(
-    run: &Run<N>,
-    machine: &Machine<N>,
-) -> Result<Vec<Ceilings>, (u32, Problem)> {
+pub(super) fn along<const N: usize>(run: &Run<N>, machine: &Machine<N>) -> AtLine<Vec<Ceilings>> {
     let is_curve = |step: &Move<N>| matches!(step.element, Element::Polynomial { role: Role::Curve, .. });
     let axes = machine.letters_by_place();
     let mut all: Vec<Ceilings> = Vec::with_capacity(run.moves().len());
@@ -141,7 +138,7 @@ fn lower_curve<const N: usize>(
     first: usize,
     all: &mut [Ceilings],
     machine: &Machine<N>,
-) -> Result<(), (u32, Problem)> {
+) -> AtLine<()> {
     let axes = machine.letters_by_place();
     let moves = &run.moves()[first..first + all.len()];
     let mut feeds: Vec<f64> = all.iter().map(|ceilings| ceilings.programmed.feed_mm_s).collect();

@@ -4,7 +4,7 @@
 //! pieces can follow within their stated errors. A curve that is not smooth, or that has no pieces, is
 //! refused with its line.
 
-use super::error::Problem;
+use super::error::{AtLine, Problem};
 use super::runs::move_at;
 use crate::gcode::{Axis, CubicMove, Nurbs, NurbsMove, PathMode};
 use crate::machine::Machine;
@@ -71,7 +71,7 @@ pub(super) fn through<const N: usize>(
     from: Vector<N>,
     points: &mut Vec<Point<N>>,
     machine: &Machine<N>,
-) -> Result<Vec<Move<N>>, (u32, Problem)> {
+) -> AtLine<Vec<Move<N>>> {
     let points = std::mem::take(points);
     let Some(first) = points.first() else { return Ok(Vec::new()) };
     let all: Vec<Vector<N>> = std::iter::once(from).chain(points.iter().map(|point| point.at)).collect();

@@ -43,6 +43,16 @@ pub struct PlanningError {
     pub problem: Problem,
 }
 
+impl PlanningError {
+    /// A problem in a line of a program.
+    pub(crate) fn at_line(source_name: &str, (line, problem): (u32, Problem)) -> Self {
+        Self { source_name: source_name.to_owned(), place: line.into(), problem }
+    }
+}
+
+/// Something that fails with a problem in a program line.
+pub(crate) type AtLine<T> = Result<T, (u32, Problem)>;
+
 /// A problem: the value that was found, and what was expected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Problem {

@@ -9,7 +9,7 @@ use motion_kernel::num::Real;
 use motion_kernel::program::Item;
 
 use super::compiled::bytes;
-use super::error::{PlanningError, Problem};
+use super::error::{AtLine, PlanningError};
 use super::items::Items;
 use super::stretch::Stretch;
 use super::{Item as PlanItem, Plan};
@@ -31,11 +31,6 @@ impl<const N: usize> Executable<N> {
     /// A move can't be made into pieces, a figure is beyond the number type, or more pieces or segments than
     /// the tick's bound fall into one tick.
     pub fn new<R: Real>(plan: &Plan<N>) -> Result<Self, PlanningError> {
-        let fail = |line: u32, problem: Problem| PlanningError {
-            source_name: plan.source.clone(),
-            place: line.into(),
-            problem,
-        };
         let mut items = Vec::with_capacity(plan.items.len());
         let mut maker = Items::<R, N>::new(plan.tick_s, plan.axes);
         let mut put = |item: Item<N>| {
@@ -43,11 +38,13 @@ impl<const N: usize> Executable<N> {
             Ok(())
         };
         for item in &plan.items {
-            let made = match item {
-                PlanItem::Stretch(stretch) => whole(&mut maker, stretch, &mut put),
-                item => maker.rest(item, &mut put),
+            let made = match *item {
+                PlanItem::Stretch(ref stretch) => whole(&mut maker, stretch, &mut put),
+                PlanItem::Dwell { line, seconds } => maker.dwell(line, seconds).and_then(&mut put),
+                PlanItem::Switch { to, .. } => put(Item::Switch(to)),
+                PlanItem::Stop { .. } => put(Item::Stop),
             };
-            made.map_err(|(line, problem)| fail(line, problem))?;
+            made.map_err(|problem| PlanningError::at_line(&plan.source, problem))?;
         }
         Ok(Self { items, tick_s: plan.tick_s })
     }
@@ -81,8 +78,8 @@ impl<const N: usize> Executable<N> {
 fn whole<R: Real, const N: usize>(
     maker: &mut Items<R, N>,
     stretch: &Stretch<N>,
-    put: &mut impl FnMut(Item<N>) -> Result<(), (u32, Problem)>,
-) -> Result<(), (u32, Problem)> {
+    put: &mut impl FnMut(Item<N>) -> AtLine<()>,
+) -> AtLine<()> {
     stretch.blocks.iter().try_for_each(|block| maker.block(block))?;
     stretch.profile.ramps().iter().try_for_each(|placed| maker.ramp(placed.planned))?;
     maker.end(put)

@@ -14,10 +14,9 @@ use motion_kernel::plan::Ceiling;
 use motion_kernel::program::{Allowed, Item, PathBlock};
 use motion_kernel::units::Position;
 
-use super::Item as PlanItem;
 use super::ceilings::few_digits;
 use super::density::{PiecePace, SegmentPace};
-use super::error::Problem;
+use super::error::{AtLine, Problem};
 use super::profile::{PlacedRamp, ROUNDING_MM};
 use super::stretch::StretchBlock;
 use crate::gcode::Axis;
@@ -25,9 +24,6 @@ use crate::toolpath::{CompileError, Placed, compile, exact, on_path};
 
 /// Blocks with equal ceilings that become one at most. So the wait for the next one is bounded.
 const MERGED_MAX: u32 = 256;
-
-/// An error comes with the program line.
-type AtLine<T> = Result<T, (u32, Problem)>;
 
 /// Makes items for kernels of the number type `R`.
 pub(super) struct Items<R, const N: usize> {
@@ -148,24 +144,13 @@ impl<R: Real, const N: usize> Items<R, N> {
         Ok(())
     }
 
-    /// What stands between stretches.
-    pub(super) fn rest(
-        &mut self,
-        item: &PlanItem<N>,
-        put: &mut impl FnMut(Item<N>) -> AtLine<()>,
-    ) -> AtLine<()> {
-        match *item {
-            PlanItem::Stretch(_) => Ok(()),
-            PlanItem::Dwell { line, seconds } => {
-                let dwell = Ticks::from_seconds(seconds, self.tick_s)
-                    .ok_or((line, Problem::Dwell { seconds, tick_s: self.tick_s }))?;
-                self.piece_pace.dwell(seconds);
-                self.segment_pace.next(dwell).map_err(|problem| (line, problem))?;
-                put(Item::Dwell(dwell))
-            }
-            PlanItem::Switch { to, .. } => put(Item::Switch(to)),
-            PlanItem::Stop { .. } => put(Item::Stop),
-        }
+    /// A dwell between stretches.
+    pub(super) fn dwell(&mut self, line: u32, seconds: f64) -> AtLine<Item<N>> {
+        let dwell = Ticks::from_seconds(seconds, self.tick_s)
+            .ok_or((line, Problem::Dwell { seconds, tick_s: self.tick_s }))?;
+        self.piece_pace.dwell(seconds);
+        self.segment_pace.next(dwell).map_err(|problem| (line, problem))?;
+        Ok(Item::Dwell(dwell))
     }
 
     /// Looks at the times of the pieces that end before a place, or of all.

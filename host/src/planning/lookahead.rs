@@ -8,7 +8,7 @@ use motion_kernel::plan::{Block, BlockPlan, Effort, Memory, Node, Path, PlanErro
 use motion_kernel::units::Position;
 
 use super::Mode;
-use super::error::Problem;
+use super::error::{AtLine, Problem};
 use crate::toolpath::on_path;
 
 /// Halvings of the feed at an end between one that is reached and one that is not: to 10⁻⁹ of their difference.
@@ -48,11 +48,10 @@ fn over(
 pub(super) struct LookAhead {
     mode: Mode,
     tick_s: f64,
-    /// Blocks that are not settled to their ends, and where they end.
+    /// Blocks that are not settled to their ends, where they end, and their program lines.
     blocks: Vec<Block<f64>>,
     ends: Vec<Position>,
-    /// Blocks before them.
-    before: usize,
+    lines: Vec<u32>,
     /// Ramps are settled up to here; the feed there \[mm/s\].
     settled: Position,
     feed_mm_s: f64,
@@ -68,22 +67,18 @@ impl LookAhead {
             tick_s,
             blocks: Vec::new(),
             ends: Vec::new(),
-            before: 0,
+            lines: Vec::new(),
             settled: Position::ZERO,
             feed_mm_s: 0.0,
             rest: (Vec::new(), Position::ZERO),
         }
     }
 
-    /// Blocks that are settled to their ends.
-    pub(super) fn settled_blocks(&self) -> usize {
-        self.before
-    }
-
-    /// The path goes on with a block, which ends at `end`.
-    pub(super) fn push(&mut self, block: Block<f64>, end: Position) {
+    /// The path goes on with a block of a program line, which ends at `end`.
+    pub(super) fn push(&mut self, line: u32, block: Block<f64>, end: Position) {
         self.blocks.push(block);
         self.ends.push(end);
+        self.lines.push(line);
     }
 
     /// The greatest feed from the last block to the one that is pushed next.
@@ -93,12 +88,8 @@ impl LookAhead {
         }
     }
 
-    /// Appends the ramps that are settled; all, if the path ends here. An error comes with the index of the block.
-    pub(super) fn settle(
-        &mut self,
-        goes_on: bool,
-        ramps: &mut Vec<PlannedRamp>,
-    ) -> Result<(), (usize, Problem)> {
+    /// Appends the ramps that are settled; all, if the path ends here.
+    pub(super) fn settle(&mut self, goes_on: bool, ramps: &mut Vec<PlannedRamp>) -> AtLine<()> {
         // S3's plan is one for the whole stretch.
         if self.blocks.is_empty() || goes_on && self.mode == Mode::PerBlock {
             return Ok(());
@@ -110,9 +101,9 @@ impl LookAhead {
                 let (rest, end) = std::mem::take(&mut self.rest);
                 ramps.extend(rest);
                 self.go_on(end, 0.0);
-                self.planned().map_err(|(block, problem)| (self.before + block, problem))?
+                self.planned()?
             }
-            Err((block, problem)) => return Err((self.before + block, problem)),
+            Err(error) => return Err(error),
         };
         if !goes_on {
             ramps.append(&mut planned);
@@ -142,11 +133,11 @@ impl LookAhead {
         let done = self.ends.partition_point(|&end| end <= from);
         self.blocks.drain(..done);
         self.ends.drain(..done);
-        self.before += done;
+        self.lines.drain(..done);
     }
 
     /// From the settled place to rest at the end of what is known.
-    fn planned(&self) -> Result<Vec<PlannedRamp>, (usize, Problem)> {
+    fn planned(&self) -> AtLine<Vec<PlannedRamp>> {
         let (mut blocks, mut ends) = (self.blocks.clone(), self.ends.clone());
         ends.iter_mut().for_each(|end| *end = *end - self.settled);
         if self.settled > Position::ZERO
@@ -155,7 +146,9 @@ impl LookAhead {
             // The part of it that is left.
             first.length_mm = first.length_mm.min(end.to_mm());
         }
+        let line = |block: usize| self.lines.get(block).copied().unwrap_or(0);
         over(&blocks, &ends, [self.feed_mm_s, 0.0], self.mode, self.tick_s)
+            .map_err(|(block, problem)| (line(block), problem))
     }
 
     /// How many of these ramps more path does not change, and up to which place of the one behind, a cruise.

@@ -122,6 +122,14 @@ pub struct Plan<const N: usize = 3> {
 }
 
 impl<const N: usize> Plan<N> {
+    /// Refuses a plan with probing moves, for boards.
+    pub(crate) fn refuse_probes(&self) -> Result<(), PlanningError> {
+        match self.probes.first() {
+            Some(probe) => Err(PlanningError::at_line(&self.source, (probe.line, Problem::NoProbeInput))),
+            None => Ok(()),
+        }
+    }
+
     /// A plan with nothing to do.
     fn empty(source: &str, pulse: Pulse, tick_s: f64, axes: [Option<Axis>; N]) -> Self {
         Self {

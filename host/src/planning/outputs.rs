@@ -90,11 +90,7 @@ pub fn require_outputs<const N: usize>(
             .or(coolant.filter(|_| machine.coolant.is_none()).map(|word| (word, "coolant")));
         if let Some((word, table)) = lacking {
             let problem = Problem::NoOutput { word, table };
-            return Err(PlanningError {
-                source_name: source_name.to_owned(),
-                place: step.line.into(),
-                problem,
-            });
+            return Err(PlanningError::at_line(source_name, (step.line, problem)));
         }
     }
     Ok(())

@@ -3,16 +3,13 @@
 //! Memory is that of [`TOGETHER`] sections and of the path that is not settled yet, whatever the length of the program.
 
 use super::Mode;
-use super::error::Problem;
-use super::runs::{Part, Runs};
+use super::error::AtLine;
+use super::runs::{Between, Runs};
 use super::sections::{Smoothed, TOGETHER, smoothed};
 use super::stretch::{Growing, Known};
 use crate::gcode::{Message, Nurbs, Step};
 use crate::machine::Machine;
 use crate::toolpath::smooth::Move;
-
-/// An error comes with the program line.
-type AtLine<T> = Result<T, (u32, Problem)>;
 
 /// Takes what comes out.
 pub(super) type Out<'a, const N: usize> = dyn FnMut(Next<N>) -> AtLine<()> + 'a;
@@ -22,7 +19,7 @@ pub(super) enum Next<const N: usize> {
     /// Of a stretch.
     Path(Known<N>),
     /// Between stretches.
-    Between(Part<N>),
+    Between(Between),
 }
 
 /// A program on its way.
@@ -74,12 +71,7 @@ impl<'m, const N: usize> Pipeline<'m, N> {
         self.end(out)
     }
 
-    /// Behind the last step.
-    pub(super) fn finish(&mut self, out: &mut Out<'_, N>) -> AtLine<()> {
-        self.end(out)
-    }
-
-    /// What was taken comes out, to rest.
+    /// What was taken comes out, to rest: behind the last step, or where no more is to come.
     pub(super) fn end(&mut self, out: &mut Out<'_, N>) -> AtLine<()> {
         let spline = self.runs.end_spline();
         self.runs.stop();
@@ -95,7 +87,7 @@ impl<'m, const N: usize> Pipeline<'m, N> {
                 Ok(Smoothed::Blocks { blocks, goes_on }) => {
                     self.growing.take(blocks, goes_on, &mut |known| out(Next::Path(known)))?;
                 }
-                Ok(Smoothed::Other(part)) => out(Next::Between(part))?,
+                Ok(Smoothed::Between(what)) => out(Next::Between(what))?,
                 Err(error) => {
                     self.growing.end(&mut |known| out(Next::Path(known)))?;
                     return Err(error);

@@ -2,11 +2,11 @@
 
 use motion_kernel::law::PlannedRamp;
 
-use super::error::{PlanningError, Problem};
+use super::error::{AtLine, PlanningError};
 use super::executable::Executable;
 use super::outputs::acts_on;
 use super::pipeline::{Next, Pipeline};
-use super::runs::Part;
+use super::runs::Between;
 use super::stretch::{Known, Stretch, StretchBlock};
 use super::{Item, Mode, PlacedRamp, Plan, PlannedProbe, travel};
 use crate::gcode::{PathMode, Program, Step};
@@ -24,13 +24,6 @@ pub fn plan_program<const N: usize>(
     machine: &Machine<N>,
     mode: Mode,
 ) -> Result<Plan<N>, PlanningError> {
-    let at = |line: u32| {
-        move |problem: Problem| PlanningError {
-            source_name: source_name.to_owned(),
-            place: line.into(),
-            problem,
-        }
-    };
     let machine = &driven(machine, mode);
     let mut plan = Plan::empty(source_name, machine.path.pulse, machine.tick_s, machine.letters_by_place());
     plan.notices = notes(program, machine);
@@ -39,8 +32,8 @@ pub fn plan_program<const N: usize>(
     let mut out = |next| gathered.take(next);
     pipeline
         .take((&program.steps, &program.nurbs, &[]), &mut out)
-        .and_then(|()| pipeline.finish(&mut out))
-        .map_err(|(line, problem)| at(line)(problem))?;
+        .and_then(|()| pipeline.end(&mut out))
+        .map_err(|problem| PlanningError::at_line(source_name, problem))?;
     gathered.checked(machine)
 }
 
@@ -58,11 +51,7 @@ pub fn plan_moves<const N: usize>(
     let plan = Plan::empty(source_name, machine.path.pulse, machine.tick_s, machine.letters_by_place());
     let (mut pipeline, mut gathered) = (Pipeline::new(machine, mode), Gathered::new(plan));
     let taken = pipeline.take_moves(moves, &mut |next| gathered.take(next));
-    taken.map_err(|(line, problem)| PlanningError {
-        source_name: source_name.to_owned(),
-        place: line.into(),
-        problem,
-    })?;
+    taken.map_err(|problem| PlanningError::at_line(source_name, problem))?;
     gathered.checked(machine)
 }
 
@@ -79,23 +68,21 @@ impl<const N: usize> Gathered<N> {
         Self { plan, blocks: Vec::new(), ramps: Vec::new() }
     }
 
-    fn take(&mut self, next: Next<N>) -> Result<(), (u32, Problem)> {
+    fn take(&mut self, next: Next<N>) -> AtLine<()> {
         let plan = &mut self.plan;
         match next {
             Next::Path(Known::Block(block)) => self.blocks.push(block),
             Next::Path(Known::Ramp(ramp)) => self.ramps.push(ramp),
             Next::Path(Known::End) => self.close(),
-            // These are smoothed.
-            Next::Between(Part::Moves { .. }) => {}
-            Next::Between(Part::Probe { line, probe }) => {
+            Next::Between(Between::Probe { line, probe }) => {
                 plan.probes.push(PlannedProbe::new(line, plan.stretches, &probe));
             }
-            Next::Between(Part::Dwell { line, seconds }) => {
+            Next::Between(Between::Dwell { line, seconds }) => {
                 plan.time_s += seconds;
                 plan.items.push(Item::Dwell { line, seconds });
             }
-            Next::Between(Part::Switch { line, to }) => plan.items.push(Item::Switch { line, to }),
-            Next::Between(Part::Stop { line, .. }) => plan.items.push(Item::Stop { line }),
+            Next::Between(Between::Switch { line, to }) => plan.items.push(Item::Switch { line, to }),
+            Next::Between(Between::Stop { line, .. }) => plan.items.push(Item::Stop { line }),
         }
         Ok(())
     }
@@ -121,11 +108,7 @@ impl<const N: usize> Gathered<N> {
     fn checked(self, machine: &Machine<N>) -> Result<Plan<N>, PlanningError> {
         let Self { plan, .. } = self;
         for item in &Executable::new::<f32>(&plan)?.items {
-            travel::check(item, machine).map_err(|(line, problem)| PlanningError {
-                source_name: plan.source.clone(),
-                place: line.into(),
-                problem,
-            })?;
+            travel::check(item, machine).map_err(|problem| PlanningError::at_line(&plan.source, problem))?;
         }
         Ok(plan)
     }

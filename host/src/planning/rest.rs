@@ -11,7 +11,7 @@ use motion_kernel::units::Position;
 
 use super::Mode;
 use super::density::SegmentPace;
-use super::error::Problem;
+use super::error::{AtLine, Problem};
 use super::lookahead::{block_at, lookahead};
 use crate::toolpath::Placed;
 
@@ -24,7 +24,7 @@ pub(crate) fn rest_of_stretch<R: Real, const N: usize>(
     piece: usize,
     pulse: Pulse,
     tick_s: f64,
-) -> Result<Vec<Item<N>>, (u32, Problem)> {
+) -> AtLine<Vec<Item<N>>> {
     let before = stretch.iter().take(piece).filter_map(piece_length);
     let start = before.fold(Position::ZERO, |start, length| start + length);
     let blocks = blocks_from(stretch, start);

@@ -12,7 +12,7 @@ use std::ops::Range;
 use motion_kernel::hal::OutputState;
 
 use super::curves::{Point, cubic, nurbs, through};
-use super::error::Problem;
+use super::error::{AtLine, Problem};
 use super::outputs::Switches;
 use super::travel;
 use crate::gcode::{Feed, LineMove, Message, Nurbs, PathMode, ProbeMove, Step, StepKind};
@@ -45,6 +45,13 @@ pub(super) enum Part<const N: usize> {
         /// The next part goes on without a stop.
         goes_on: bool,
     },
+    /// What stands between stretches.
+    Between(Between),
+}
+
+/// What stands between stretches.
+#[derive(Clone, Debug)]
+pub(super) enum Between {
     /// A probing move; its motion is the next part, unless it stands.
     Probe { line: u32, probe: Box<ProbeMove> },
     /// Rest.
@@ -75,9 +82,6 @@ pub(super) struct Runs<'m, const N: usize> {
     /// Messages since the last program stop, each with its line.
     said: Vec<(u32, String)>,
 }
-
-/// An error comes with the program line.
-type AtLine<T> = Result<T, (u32, Problem)>;
 
 impl<'m, const N: usize> Runs<'m, N> {
     /// Before the first step.
@@ -158,7 +162,7 @@ impl<'m, const N: usize> Runs<'m, N> {
                 self.stop();
                 let ProbeMove { from, to, end, feed, .. } = *probe;
                 travel::check_end(end, machine).map_err(at)?;
-                self.parts.push(Part::Probe { line, probe: Box::new(*probe) });
+                self.between(Between::Probe { line, probe: Box::new(*probe) });
                 if from != to {
                     let to = LineMove { from, to, feed, mode: PathMode::ExactStop };
                     self.go([path_move(Element::line(&to, machine), feed, to.mode)]);
@@ -172,7 +176,7 @@ impl<'m, const N: usize> Runs<'m, N> {
             StepKind::Switch(_) => {
                 self.stop();
                 if let Some((to, wait_s)) = switch {
-                    self.parts.push(Part::Switch { line, to });
+                    self.between(Between::Switch { line, to });
                     self.rest(line, wait_s);
                 }
             }
@@ -180,13 +184,13 @@ impl<'m, const N: usize> Runs<'m, N> {
                 self.stop();
                 // A message of its line names the tool, too.
                 let others = take(&mut self.said).into_iter().filter(|&(of_line, _)| of_line != line);
-                self.parts
-                    .push(Part::Stop { line, said: words(format!("changes to tool {tool}"), line, others) });
+                let said = words(format!("changes to tool {tool}"), line, others);
+                self.between(Between::Stop { line, said });
             }
             StepKind::Stop => {
                 self.stop();
                 let said = words("stops".to_owned(), line, take(&mut self.said).into_iter());
-                self.parts.push(Part::Stop { line, said });
+                self.between(Between::Stop { line, said });
             }
             StepKind::End => self.stop(),
         }
@@ -304,10 +308,14 @@ impl<'m, const N: usize> Runs<'m, N> {
         }
     }
 
+    fn between(&mut self, what: Between) {
+        self.parts.push(Part::Between(what));
+    }
+
     /// A dwell; one of no time changes nothing but the stop it makes.
     fn rest(&mut self, line: u32, seconds: f64) {
         if seconds > 0.0 {
-            self.parts.push(Part::Dwell { line, seconds });
+            self.between(Between::Dwell { line, seconds });
         }
     }
 }

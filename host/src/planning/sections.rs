@@ -7,8 +7,8 @@ use std::thread;
 use motion_kernel::internals::{add_work, work_done};
 
 use super::blending::blocks;
-use super::error::Problem;
-use super::runs::Part;
+use super::error::AtLine;
+use super::runs::{Between, Part};
 use super::stretch::StretchBlock;
 use crate::machine::Machine;
 
@@ -22,8 +22,8 @@ pub(super) enum Smoothed<const N: usize> {
         /// The next part goes on without a stop.
         goes_on: bool,
     },
-    /// What has no moves.
-    Other(Part<N>),
+    /// What stands between stretches.
+    Between(Between),
 }
 
 /// Moves that are worth a thread.
@@ -36,7 +36,7 @@ pub(super) const TOGETHER: usize = 4;
 pub(super) fn smoothed<const N: usize>(
     parts: Vec<Part<N>>,
     machine: &Machine<N>,
-) -> Vec<Result<Smoothed<N>, (u32, Problem)>> {
+) -> Vec<AtLine<Smoothed<N>>> {
     let is_long = |part: &Part<N>| matches!(part, Part::Moves { moves, .. } if moves.len() >= MOVES_MIN);
     let long = parts.iter().filter(|part| is_long(part)).count();
     let threads = thread::available_parallelism().map_or(1, usize::from).min(long);
@@ -68,11 +68,11 @@ pub(super) fn smoothed<const N: usize>(
     places.into_iter().filter_map(|place| place.into_inner().ok()?.1).collect()
 }
 
-fn one<const N: usize>(part: Part<N>, machine: &Machine<N>) -> Result<Smoothed<N>, (u32, Problem)> {
+fn one<const N: usize>(part: Part<N>, machine: &Machine<N>) -> AtLine<Smoothed<N>> {
     match part {
         Part::Moves { moves, goes_on } => {
             blocks(&moves, machine).map(|blocks| Smoothed::Blocks { blocks, goes_on })
         }
-        other => Ok(Smoothed::Other(other)),
+        Part::Between(what) => Ok(Smoothed::Between(what)),
     }
 }

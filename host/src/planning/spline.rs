@@ -1,6 +1,6 @@
 //! A spline to a plan: one stretch from its start to its end.
 
-use super::error::{PlanningError, Problem};
+use super::error::{AtLine, PlanningError, Problem};
 use super::program::plan_moves;
 use super::{Mode, Plan};
 use crate::machine::Machine;
@@ -51,15 +51,11 @@ pub fn plan_spline<const N: usize>(
     });
     let moves: Vec<Move<N>> = (norm(start) > 0.0).then_some(approach).into_iter().chain(spans).collect();
     // Before the plan, which knows a cusp only as a limit of 0.
-    let pieces = pieces(&moves).map_err(|(line, problem)| PlanningError {
-        source_name: source_name.to_owned(),
-        place: line.into(),
-        problem,
-    })?;
+    let pieces = pieces(&moves).map_err(|problem| PlanningError::at_line(source_name, problem))?;
     Ok((plan_moves(source_name, moves, machine, Mode::default())?, pieces))
 }
 
-fn pieces<const N: usize>(moves: &[Move<N>]) -> Result<Pieces, (u32, Problem)> {
+fn pieces<const N: usize>(moves: &[Move<N>]) -> AtLine<Pieces> {
     let mut pieces = Pieces::default();
     for Move { line, element, .. } in moves {
         let septics = septics::<f32, _>(element).map_err(|error| (*line, Problem::Geometry(error.into())))?;

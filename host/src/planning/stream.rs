@@ -3,12 +3,12 @@
 use motion_kernel::num::Real;
 use motion_kernel::program::Item;
 
-use super::error::{PlanningError, Problem};
+use super::error::{AtLine, PlanningError, Problem};
 use super::items::Items;
 use super::pipeline::{Next, Out, Pipeline};
-use super::runs::Part;
+use super::runs::Between;
 use super::stretch::Known;
-use super::{Item as PlanItem, Mode, travel};
+use super::{Mode, travel};
 use crate::gcode::Batch;
 use crate::machine::Machine;
 
@@ -52,15 +52,7 @@ impl<'m, R: Real, const N: usize> Stream<'m, R, N> {
         self.run(put, |pipeline, out| pipeline.take((&batch.steps, &batch.nurbs, &batch.messages), out))
     }
 
-    /// Gives out the rest, behind the last step.
-    ///
-    /// # Errors
-    /// As [`take`](Self::take).
-    pub fn finish(&mut self, put: &mut dyn FnMut(Streamed<N>)) -> Result<(), PlanningError> {
-        self.run(put, |pipeline, out| pipeline.finish(out))
-    }
-
-    /// Gives out what was taken, to rest, where the rest of the program is not to come.
+    /// Gives out what was taken, to rest: behind the last step, or where the rest of the program is not to come.
     ///
     /// # Errors
     /// As [`take`](Self::take).
@@ -71,7 +63,7 @@ impl<'m, R: Real, const N: usize> Stream<'m, R, N> {
     fn run(
         &mut self,
         put: &mut dyn FnMut(Streamed<N>),
-        step: impl FnOnce(&mut Pipeline<'m, N>, &mut Out<'_, N>) -> Result<(), (u32, Problem)>,
+        step: impl FnOnce(&mut Pipeline<'m, N>, &mut Out<'_, N>) -> AtLine<()>,
     ) -> Result<(), PlanningError> {
         let Self { source_name, machine, pipeline, items } = self;
         let mut checked = |item: Item<N>, stop: Option<String>| {
@@ -88,21 +80,12 @@ impl<'m, R: Real, const N: usize> Stream<'m, R, N> {
                     items.give(&mut put)
                 }
                 Next::Path(Known::End) => items.end(&mut put),
-                Next::Between(Part::Moves { .. }) => Ok(()),
-                Next::Between(Part::Probe { line, .. }) => Err((line, Problem::NoProbeInput)),
-                Next::Between(Part::Dwell { line, seconds }) => {
-                    items.rest(&PlanItem::Dwell { line, seconds }, &mut put)
-                }
-                Next::Between(Part::Switch { line, to }) => {
-                    items.rest(&PlanItem::Switch { line, to }, &mut put)
-                }
-                Next::Between(Part::Stop { said, .. }) => checked(Item::Stop, Some(said)),
+                Next::Between(Between::Probe { line, .. }) => Err((line, Problem::NoProbeInput)),
+                Next::Between(Between::Dwell { line, seconds }) => items.dwell(line, seconds).and_then(put),
+                Next::Between(Between::Switch { to, .. }) => put(Item::Switch(to)),
+                Next::Between(Between::Stop { said, .. }) => checked(Item::Stop, Some(said)),
             }
         });
-        done.map_err(|(line, problem)| PlanningError {
-            source_name: source_name.clone(),
-            place: line.into(),
-            problem,
-        })
+        done.map_err(|problem| PlanningError::at_line(source_name, problem))
     }
 }

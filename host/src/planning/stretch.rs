@@ -5,7 +5,7 @@ use motion_kernel::plan::{Block, Ceiling};
 
 use super::Mode;
 use super::ceilings::junction_feed;
-use super::error::Problem;
+use super::error::AtLine;
 use super::lookahead::LookAhead;
 use super::profile::FeedProfile;
 use crate::machine::Machine;
@@ -58,9 +58,6 @@ pub(super) struct Growing<'m, const N: usize> {
     last: Option<StretchBlock<N>>,
     end_mm: f64,
     ramps: Vec<PlannedRamp>,
-    /// Lines of the blocks of this stretch, in runs: from which block on.
-    lines: Vec<(usize, u32)>,
-    blocks: usize,
     /// The last block is the last one of a section.
     is_cut: bool,
 }
@@ -69,16 +66,7 @@ impl<'m, const N: usize> Growing<'m, N> {
     /// Before the first block.
     pub(super) fn new(machine: &'m Machine<N>, mode: Mode) -> Self {
         let ahead = LookAhead::new(mode, machine.tick_s);
-        Self {
-            machine,
-            ahead,
-            last: None,
-            end_mm: 0.0,
-            ramps: Vec::new(),
-            lines: Vec::new(),
-            blocks: 0,
-            is_cut: false,
-        }
+        Self { machine, ahead, last: None, end_mm: 0.0, ramps: Vec::new(), is_cut: false }
     }
 
     /// Takes a section's blocks; the path goes on behind them without a stop, or not. An error comes with the program line.
@@ -86,8 +74,8 @@ impl<'m, const N: usize> Growing<'m, N> {
         &mut self,
         blocks: Vec<StretchBlock<N>>,
         goes_on: bool,
-        known: &mut impl FnMut(Known<N>) -> Result<(), (u32, Problem)>,
-    ) -> Result<(), (u32, Problem)> {
+        known: &mut impl FnMut(Known<N>) -> AtLine<()>,
+    ) -> AtLine<()> {
         for block in blocks {
             if let Some(mut last) = self.last.take() {
                 // Within a section it is known already.
@@ -99,11 +87,7 @@ impl<'m, const N: usize> Growing<'m, N> {
             }
             self.end_mm += block.element.length_mm();
             let end = on_path(self.end_mm).map_err(|error| (block.line, error.into()))?;
-            self.ahead.push(block.for_lookahead(), end);
-            if self.lines.last().is_none_or(|&(_, line)| line != block.line) {
-                self.lines.push((self.blocks, block.line));
-            }
-            self.blocks += 1;
+            self.ahead.push(block.line, block.for_lookahead(), end);
             self.last = Some(block);
         }
         if goes_on {
@@ -114,10 +98,7 @@ impl<'m, const N: usize> Growing<'m, N> {
     }
 
     /// The path ends here, at rest, if it has not yet.
-    pub(super) fn end(
-        &mut self,
-        known: &mut impl FnMut(Known<N>) -> Result<(), (u32, Problem)>,
-    ) -> Result<(), (u32, Problem)> {
+    pub(super) fn end(&mut self, known: &mut impl FnMut(Known<N>) -> AtLine<()>) -> AtLine<()> {
         self.is_cut = false;
         match self.last.take() {
             Some(last) => self.give(StretchBlock { junction_mm_s: 0.0, ..last }, known),
@@ -126,36 +107,19 @@ impl<'m, const N: usize> Growing<'m, N> {
     }
 
     /// Gives out a block, and ends the stretch where motion stops behind it.
-    fn give(
-        &mut self,
-        block: StretchBlock<N>,
-        known: &mut impl FnMut(Known<N>) -> Result<(), (u32, Problem)>,
-    ) -> Result<(), (u32, Problem)> {
+    fn give(&mut self, block: StretchBlock<N>, known: &mut impl FnMut(Known<N>) -> AtLine<()>) -> AtLine<()> {
         known(Known::Block(block))?;
         if block.junction_mm_s > 0.0 {
             return Ok(());
         }
         self.settle(false, known)?;
-        (self.end_mm, self.blocks) = (0.0, 0);
-        self.lines.clear();
+        self.end_mm = 0.0;
         known(Known::End)
     }
 
-    fn settle(
-        &mut self,
-        goes_on: bool,
-        known: &mut impl FnMut(Known<N>) -> Result<(), (u32, Problem)>,
-    ) -> Result<(), (u32, Problem)> {
-        let settled = self.ahead.settle(goes_on, &mut self.ramps);
-        settled.map_err(|(block, problem)| (self.line_of(block), problem))?;
-        let done = self.lines.partition_point(|&(first, _)| first <= self.ahead.settled_blocks());
-        self.lines.drain(..done.saturating_sub(1));
+    fn settle(&mut self, goes_on: bool, known: &mut impl FnMut(Known<N>) -> AtLine<()>) -> AtLine<()> {
+        self.ahead.settle(goes_on, &mut self.ramps)?;
         self.ramps.drain(..).try_for_each(|ramp| known(Known::Ramp(ramp)))
-    }
-
-    fn line_of(&self, block: usize) -> u32 {
-        let runs = self.lines.partition_point(|&(first, _)| first <= block);
-        runs.checked_sub(1).and_then(|run| self.lines.get(run)).map_or(0, |&(_, line)| line)
     }
 }
 

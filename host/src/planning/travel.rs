@@ -5,13 +5,13 @@
 use motion_kernel::path::Piece;
 use motion_kernel::program::Item;
 
-use super::error::Problem;
+use super::error::{AtLine, Problem};
 use crate::axis_unit::AxisUnit;
 use crate::gcode::Point;
 use crate::machine::{AxisSettings, Machine};
 
 /// Refuses a piece that leaves the travel at its ends or between them. An error comes with the program line.
-pub(super) fn check<const N: usize>(item: &Item<N>, machine: &Machine<N>) -> Result<(), (u32, Problem)> {
+pub(super) fn check<const N: usize>(item: &Item<N>, machine: &Machine<N>) -> AtLine<()> {
     let (line, piece) = match *item {
         Item::Line { line, start, direction, length } => {
             (line, Piece::<f64, N>::line(line, start, direction, length))
