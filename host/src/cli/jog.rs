@@ -4,20 +4,20 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 
 use clap::Args;
+use motion_kernel::num::Root;
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
 use super::outputs::Outputs;
-use super::port::{OptionalPort, PortArguments};
+use super::port::{OnBoard, OptionalPort, PortArguments};
 use super::table::{self, Align};
 use super::units::{InUnit, TableUnits};
-use super::{input, send, write_json};
+use super::{input, write_json};
 use crate::board::jog::Jogs;
 use crate::board::sender::{Found, Permissions};
-use crate::board::{Connection, Job, Port};
+use crate::board::{Connection, Job};
 use crate::files::{Files, interrupt};
 use crate::machine::{Machine, on_machine};
-use crate::planning::on_axis_count;
 use crate::simulate::job::RunInfo;
 use crate::simulate::jog::{Ended, Jogged, Keys, Press};
 
@@ -157,50 +157,49 @@ fn jog_on_board<const N: usize>(
     (port, keys): (&PortArguments, &Keys<'_, N>),
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
-    if port.port == Port::Simulator {
-        let (connection, _board) = port.simulated(machine)?;
-        return press(&Job::<N>::new(machine, &[]), machine, arguments, (port, keys), connection, out);
-    }
-    on_axis_count!(machine.axis_count(), M => {
-        let connection = port.open::<M>()?;
-        press(&Job::<M>::new(machine, &[]), machine, arguments, (port, keys), connection, out)
-    })
+    let dead_man_ms = arguments.dead_man_ms()?;
+    port.on_board(machine, OnKeys { machine, arguments, port, keys, dead_man_ms, out })
 }
 
-/// Presses the keys, which Ctrl-C releases.
-fn press<const N: usize, const M: usize>(
-    job: &Job<M>,
-    machine: &Machine<N>,
-    arguments: &JogArguments,
-    (port, keys): (&PortArguments, &Keys<'_, N>),
-    mut connection: Connection<M>,
-    out: &mut dyn Write,
-) -> Result<Outcome, CliError> {
-    let dead_man_ms = arguments.dead_man_ms()?;
-    let axes: Vec<String> = machine.driven_axes().iter().map(|axis| axis.name.clone()).collect();
-    let found = if arguments.restart { Found::GivenUp } else { Found::Stays };
-    let may = Permissions { enables: arguments.enable, found, ..Permissions::default() };
-    let jogs = Jogs { keys, job, axes: &axes, may, dead_man_ms };
-    let (mut jogged, mut is_released, mut ended) = (Vec::new(), false, Ok(()));
-    send::greet(&mut connection).map_err(|error| port.refused(error))?;
-    interrupt::hold_first();
-    for key in 0..keys.count() {
-        let one = jogs.press(key, &mut connection, &mut || {
-            is_released |= interrupt::take_asked().is_some();
-            is_released
-        });
-        match one {
-            Ok(one) => jogged.push(one),
-            Err(error) => ended = Err(port.refused(error)),
+/// Keys to be pressed on a board.
+struct OnKeys<'a, const N: usize> {
+    machine: &'a Machine<N>,
+    arguments: &'a JogArguments,
+    port: &'a PortArguments,
+    keys: &'a Keys<'a, N>,
+    dead_man_ms: u16,
+    out: &'a mut dyn Write,
+}
+
+impl<const N: usize> OnBoard for OnKeys<'_, N> {
+    /// Presses the keys, which Ctrl-C releases.
+    fn run<R: Root + Send, const M: usize>(self, mut connection: Connection<M>) -> Result<Outcome, CliError> {
+        let Self { machine, arguments, port, keys, dead_man_ms, out } = self;
+        let job = Job::<M>::new(machine, &[]);
+        let axes: Vec<String> = machine.driven_axes().iter().map(|axis| axis.name.clone()).collect();
+        let found = if arguments.restart { Found::GivenUp } else { Found::Stays };
+        let may = Permissions { enables: arguments.enable, found, ..Permissions::default() };
+        let jogs = Jogs { keys, job: &job, axes: &axes, may, dead_man_ms };
+        let (mut jogged, mut is_released, mut ended) = (Vec::new(), false, Ok(()));
+        interrupt::hold_first();
+        for key in 0..keys.count() {
+            let one = jogs.press(key, &mut connection, &mut || {
+                is_released |= interrupt::take_asked().is_some();
+                is_released
+            });
+            match one {
+                Ok(one) => jogged.push(one),
+                Err(error) => ended = Err(port.refused(error)),
+            }
+            if is_released || ended.is_err() {
+                break;
+            }
         }
-        if is_released || ended.is_err() {
-            break;
-        }
+        // Where the board is lost it holds by itself.
+        let _ = connection.settle();
+        show(&jogged, machine.tick_s, arguments.json, out)?;
+        ended.map(|()| if is_released { Outcome::Aborted } else { Outcome::Done })
     }
-    // Where the board is lost it holds by itself.
-    let _ = connection.settle();
-    show(&jogged, machine.tick_s, arguments.json, out)?;
-    ended.map(|()| if is_released { Outcome::Aborted } else { Outcome::Done })
 }
 
 /// Prints what became of the keys.

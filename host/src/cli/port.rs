@@ -1,14 +1,18 @@
 //! A board at a port, for the commands that talk to one.
 
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::io;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use clap::Args;
+use motion_kernel::num::{Fixed, Root};
 
-use super::error::CliError;
+use super::error::{CliError, Outcome};
+use crate::board::sender::{Found, Permissions};
 use crate::board::simulator::{self, SimulatedBoard};
 use crate::board::wire::Wire;
-use crate::board::{BoardError, Connection, Port};
+use crate::board::{BoardError, Connection, Heard, Port};
 use crate::machine::Machine;
+use crate::planning::on_axis_count;
 
 /// Where the board is.
 #[derive(Clone, Debug, Args)]
@@ -20,6 +24,27 @@ pub(super) struct PortArguments {
     /// Bits a second of a serial port.
     #[arg(long, value_name = "BITS_S", default_value_t = 921_600)]
     baud: u32,
+}
+
+/// What a command may do with a board's drives.
+#[derive(Clone, Copy, Debug, Args)]
+pub(super) struct DriveArguments {
+    /// Switch the drives on if they are off.
+    #[arg(long)]
+    enable: bool,
+    /// Clear a fault of the board before that.
+    #[arg(long, requires = "enable")]
+    clear_fault: bool,
+    /// Switch the drives off at the end.
+    #[arg(long)]
+    disable: bool,
+}
+
+impl DriveArguments {
+    /// What a sender may do.
+    pub(super) fn permissions(self, found: Found) -> Permissions {
+        Permissions { enables: self.enable, clears_fault: self.clear_fault, disables: self.disable, found }
+    }
 }
 
 /// Where a board is, for commands that do without one, too.
@@ -59,12 +84,58 @@ impl PortArguments {
         Ok((connection, board))
     }
 
+    /// Connects to a board for a machine, waits for its answer, and does the work in its number type.
+    pub(super) fn on_board<const N: usize>(
+        &self,
+        machine: &Machine<N>,
+        work: impl OnBoard,
+    ) -> Result<Outcome, CliError> {
+        if self.port == Port::Simulator {
+            let (mut connection, _board) = self.simulated(machine)?;
+            greet(&mut connection).map_err(|error| self.refused(error))?;
+            return work.run::<f32, N>(connection);
+        }
+        on_axis_count!(machine.axis_count(), M => {
+            let mut connection = self.open::<M>()?;
+            greet(&mut connection).map_err(|error| self.refused(error))?;
+            if connection.identity().is_some_and(|identity| identity.is_fixed_point) {
+                return work.run::<Fixed, M>(connection);
+            }
+            work.run::<f32, M>(connection)
+        })
+    }
+
     /// Opens the port for a board of `M` axes.
     pub(super) fn open<const M: usize>(&self) -> Result<Connection<M>, CliError> {
         let (port, baud) = (self.port.clone(), self.baud);
         let open = Box::new(move || port.open(baud));
         Connection::open(open, number()).map_err(|error| self.refused(error.into()))
     }
+}
+
+/// What a command does with a board that has answered.
+pub(super) trait OnBoard {
+    /// With a board of `M` axes, whose kernel is of the number type `R`.
+    fn run<R: Root + Send, const M: usize>(self, connection: Connection<M>) -> Result<Outcome, CliError>;
+}
+
+/// Waits for the board's answer: what it is.
+pub(super) fn greet<const M: usize>(connection: &mut Connection<M>) -> Result<(), BoardError> {
+    let mut lost = None;
+    for _ in 0..200 {
+        connection.step(Duration::from_millis(50), &mut |heard| {
+            if let Heard::Lost(cause) = heard {
+                lost = Some(cause);
+            }
+        });
+        if connection.identity().is_some() {
+            return Ok(());
+        }
+        if let Some(cause) = lost.take() {
+            return Err(BoardError::Wire(io::Error::other(cause)));
+        }
+    }
+    Err(BoardError::Silent)
 }
 
 /// A number that no other start has: of the time.

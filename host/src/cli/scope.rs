@@ -12,13 +12,13 @@ use clap::Args;
 use super::error::{CliError, Outcome};
 use super::outputs::{self, Written};
 use super::port::PortArguments;
-use super::trace::TraceWriter;
+use super::trace::{AXIS_COLUMNS, TraceWriter};
 use crate::board::scope::{Scope, ScopeSummary, Ticks};
 use crate::board::{BoardError, Connection, parameters};
 use crate::files::{Failure, Files, OutputFile};
 use crate::simulate::RunInfo;
 use crate::simulate::run::state_names;
-use crate::trace::{AxisTick, TraceRow};
+use crate::trace::TraceRow;
 
 /// The last ticks come within this time.
 const LATE: Duration = Duration::from_secs(1);
@@ -54,8 +54,8 @@ struct Condition {
 enum Quantity {
     State,
     Path(PathQuantity),
-    /// Of the axis with that name, or of any.
-    Axis(Option<String>, AxisQuantity),
+    /// Of the axis with that name, or of any: one of its columns.
+    Axis(Option<String>, usize),
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,17 +65,6 @@ enum PathQuantity {
     A,
     J,
     Line,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum AxisQuantity {
-    Set,
-    Vel,
-    Acc,
-    Jerk,
-    Act,
-    Err,
-    Out,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -88,16 +77,7 @@ enum Is {
 impl Quantity {
     /// That of a column of a trace file.
     fn of(column: &str) -> Option<Self> {
-        let of_axis = |quantity| match quantity {
-            "set" => Some(AxisQuantity::Set),
-            "vel" => Some(AxisQuantity::Vel),
-            "acc" => Some(AxisQuantity::Acc),
-            "jerk" => Some(AxisQuantity::Jerk),
-            "act" => Some(AxisQuantity::Act),
-            "err" => Some(AxisQuantity::Err),
-            "out" => Some(AxisQuantity::Out),
-            _ => None,
-        };
+        let of_axis = |word: &str| AXIS_COLUMNS.iter().position(|column| column.quantity == word);
         Some(match column {
             "state" => Self::State,
             "s_mm" => Self::Path(PathQuantity::S),
@@ -164,11 +144,11 @@ impl Condition {
                 PathQuantity::J => row.j_mm_s3,
                 PathQuantity::Line => f64::from(row.line),
             }),
-            (Quantity::Axis(axis, quantity), _) => names
+            (Quantity::Axis(axis, column), _) => names
                 .iter()
                 .zip(&row.axes)
                 .filter(|(name, _)| axis.as_ref().is_none_or(|axis| axis == *name))
-                .any(|(_, tick)| is(of_axis(tick, *quantity))),
+                .any(|(_, tick)| AXIS_COLUMNS.get(*column).is_some_and(|column| is((column.of)(tick)))),
         }
     }
 
@@ -178,18 +158,6 @@ impl Condition {
             Quantity::Axis(Some(axis), _) => names.contains(axis),
             _ => true,
         }
-    }
-}
-
-fn of_axis(tick: &AxisTick, quantity: AxisQuantity) -> f64 {
-    match quantity {
-        AxisQuantity::Set => tick.set_mm,
-        AxisQuantity::Vel => tick.vel_mm_s,
-        AxisQuantity::Acc => tick.acc_mm_s2,
-        AxisQuantity::Jerk => tick.jerk_mm_s3,
-        AxisQuantity::Act => tick.act_mm,
-        AxisQuantity::Err => tick.err_um,
-        AxisQuantity::Out => tick.out_v,
     }
 }
 
@@ -369,6 +337,7 @@ fn told(summary: &ScopeSummary, triggers: Option<u64>, out: &mut dyn Write) -> i
 mod tests {
     use super::*;
     use crate::machine::Machine;
+    use crate::trace::AxisTick;
 
     fn row(tick: u64, err_um: f64, state: &'static str) -> TraceRow<3> {
         let axes = [AxisTick { err_um, ..AxisTick::default() }, AxisTick::default(), AxisTick::default()];

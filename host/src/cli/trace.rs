@@ -5,24 +5,10 @@ use std::io::{self, Write};
 use super::csv_failure;
 use crate::axis_unit::AxisUnit;
 use crate::simulate::RunInfo;
-use crate::trace::TraceRow;
+use crate::trace::{AxisTick, TraceRow};
 
 /// Columns of the path, then seven of each axis that there is.
 const PATH_COLUMNS: [&str; 8] = ["tick", "t_s", "s_mm", "v_mm_s", "a_mm_s2", "j_mm_s3", "state", "line"];
-
-/// The columns of an axis, in its unit.
-fn axis_columns(unit: AxisUnit) -> [String; 7] {
-    let (mm, um) = (unit.name(), unit.thousandth_name());
-    [
-        format!("set_{mm}"),
-        format!("vel_{mm}_s"),
-        format!("acc_{mm}_s2"),
-        format!("jerk_{mm}_s3"),
-        format!("act_{mm}"),
-        format!("err_{um}"),
-        "out_v".to_owned(),
-    ]
-}
 
 // Decimals. A position step is 2⁻³² mm = 2.3·10⁻¹⁰ mm, a step of the converter 0.3 mV.
 const TIME: usize = 9;
@@ -31,6 +17,37 @@ const VELOCITY: usize = 9;
 const CHANGE: usize = 6;
 const ERROR: usize = 6;
 const VOLTS: usize = 6;
+
+/// A column of an axis.
+pub(super) struct AxisColumn {
+    /// Its name without the unit.
+    pub(super) quantity: &'static str,
+    /// The unit of an axis that counts in this.
+    unit: fn(AxisUnit) -> String,
+    decimals: usize,
+    /// Its value.
+    pub(super) of: fn(&AxisTick) -> f64,
+}
+
+/// The columns of an axis.
+pub(super) const AXIS_COLUMNS: [AxisColumn; 7] = [
+    axis_column("set", |unit| unit.name().to_owned(), POSITION, |tick| tick.set_mm),
+    axis_column("vel", |unit| format!("{}_s", unit.name()), VELOCITY, |tick| tick.vel_mm_s),
+    axis_column("acc", |unit| format!("{}_s2", unit.name()), CHANGE, |tick| tick.acc_mm_s2),
+    axis_column("jerk", |unit| format!("{}_s3", unit.name()), CHANGE, |tick| tick.jerk_mm_s3),
+    axis_column("act", |unit| unit.name().to_owned(), POSITION, |tick| tick.act_mm),
+    axis_column("err", |unit| unit.thousandth_name().to_owned(), ERROR, |tick| tick.err_um),
+    axis_column("out", |_| "v".to_owned(), VOLTS, |tick| tick.out_v),
+];
+
+const fn axis_column(
+    quantity: &'static str,
+    unit: fn(AxisUnit) -> String,
+    decimals: usize,
+    of: fn(&AxisTick) -> f64,
+) -> AxisColumn {
+    AxisColumn { quantity, unit, decimals, of }
+}
 
 /// A trace being written.
 pub(super) struct TraceWriter<W: Write> {
@@ -74,8 +91,9 @@ impl<W: Write> TraceWriter<W> {
             self.csv.write_field(column).map_err(csv_failure)?;
         }
         for axis in &info.axes {
-            for column in axis_columns(axis.unit()) {
-                self.csv.write_field(format!("{}_{column}", axis.name)).map_err(csv_failure)?;
+            for AxisColumn { quantity, unit, .. } in AXIS_COLUMNS {
+                let name = format!("{}_{quantity}_{}", axis.name, unit(axis.unit()));
+                self.csv.write_field(name).map_err(csv_failure)?;
             }
         }
         self.csv.write_record(None::<&[u8]>).map_err(csv_failure)
@@ -91,13 +109,9 @@ impl<W: Write> TraceWriter<W> {
         self.text(format_args!("{}", tick.state))?;
         self.text(format_args!("{}", tick.line))?;
         for axis in tick.axes.iter().take(self.axis_count) {
-            self.number(axis.set_mm, POSITION)?;
-            self.number(axis.vel_mm_s, VELOCITY)?;
-            self.number(axis.acc_mm_s2, CHANGE)?;
-            self.number(axis.jerk_mm_s3, CHANGE)?;
-            self.number(axis.act_mm, POSITION)?;
-            self.number(axis.err_um, ERROR)?;
-            self.number(axis.out_v, VOLTS)?;
+            for column in &AXIS_COLUMNS {
+                self.number((column.of)(axis), column.decimals)?;
+            }
         }
         self.csv.write_record(None::<&[u8]>).map_err(csv_failure)
     }

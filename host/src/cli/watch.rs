@@ -9,9 +9,9 @@ use motion_kernel::units::Position;
 
 use super::error::{CliError, Outcome};
 use super::parameters::identity;
-use super::port::PortArguments;
+use super::port::{PortArguments, greet};
 use super::scope::ScopeArguments;
-use super::send::{greet, state_words};
+use super::send::state_words;
 use crate::board::{BoardError, Connection, Heard, Scope};
 use crate::files::interrupt;
 use crate::gcode::Axis;

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use motion_kernel::link::State;
-use motion_kernel::num::{Fixed, Root};
+use motion_kernel::num::Root;
 use motion_kernel::program::Checksum;
 
 use self::confirm::Middle;
@@ -25,20 +25,18 @@ pub(super) use self::shown::state_words;
 use self::stops::Stops;
 use super::error::{CliError, Outcome};
 use super::input;
-use super::port::PortArguments;
+use super::port::{DriveArguments, OnBoard, PortArguments};
 use super::scope::ScopeArguments;
 use crate::board::from_line::from_line;
 use crate::board::items::{Said, Source};
 use crate::board::progress::{Place, Progress};
-use crate::board::sender::{Found, Permissions, check, check_outputs};
-use crate::board::{BoardError, Connection, Heard, InPlanning, Job, Port, Sender, Step};
+use crate::board::sender::{Found, check, check_outputs};
+use crate::board::{BoardError, Connection, Heard, InPlanning, Job, Sender, Step};
 use crate::files::STANDARD_INPUT;
 use crate::files::interrupt::{self, Asked};
 use crate::gcode::{self, Program, ReadOptions};
 use crate::machine::{Machine, on_machine};
-use crate::planning::{
-    Executable, Mode as PlanMode, Plan, PlanningError, on_axis_count, plan_program, require_outputs,
-};
+use crate::planning::{Executable, Mode as PlanMode, Plan, PlanningError, plan_program, require_outputs};
 use crate::simulate::RunInfo;
 
 const EXAMPLES: &str = "\
@@ -96,15 +94,8 @@ pub struct SendArguments {
     /// folder ($XDG_STATE_HOME/motion or ~/.local/state/motion); none for `simulator`, nor for a program from standard input.
     #[arg(long, value_name = "FILE")]
     journal: Option<PathBuf>,
-    /// Switch the drives on if they are off.
-    #[arg(long)]
-    enable: bool,
-    /// Clear a fault of the board before that.
-    #[arg(long, requires = "enable")]
-    clear_fault: bool,
-    /// Switch the drives off at the end.
-    #[arg(long)]
-    disable: bool,
+    #[command(flatten)]
+    drives: DriveArguments,
     /// Go on after what the board has of this program: after this command was killed, or the PC was restarted.
     #[arg(long = "continue", conflicts_with = "restart")]
     continues: bool,
@@ -152,7 +143,9 @@ fn send_program(
             options,
             leaves_out_outputs: arguments.no_spindle,
         };
-        return on_machine!(machine, machine => stream(arguments, (source, name), machine, out));
+        return on_machine!(machine, machine => {
+            arguments.port.on_board(machine, Streamed { arguments, source, name, machine, out })
+        });
     }
     let program = gcode::read_with(&source.name, &source.text, &options)?;
     let program = Sent { arguments, resumed, program: &program, sum: Checksum::of(&source.text), name };
@@ -161,13 +154,14 @@ fn send_program(
             require_outputs(&source.name, &program.program.steps, machine)?;
         }
         let plan = plan_program(&source.name, program.program, machine, PlanMode::Spanning)?;
-        if let Some(probe) = plan.probes.first() {
-            return Err(CliError::NoProbeInput { program: source.name.clone(), line: probe.line });
-        }
+        plan.refuse_probes()?;
         for notice in plan.notices.iter().filter(|_| !arguments.json) {
             writeln!(out, "note: {notice}").map_err(CliError::Output)?;
         }
-        send_plan(&program, &plan, machine, out)
+        // What the board is, is not known yet; most are of f32.
+        holds_axes::<f32, _>(machine)?;
+        let sent = &program;
+        arguments.port.on_board(machine, Planned { sent, plan: &plan, machine, out })
     })
 }
 
@@ -194,59 +188,43 @@ pub(super) fn job_name(input: u32, machine: u32) -> u32 {
     Checksum::of([input, machine].map(u32::to_le_bytes).as_flattened()).max(1)
 }
 
-/// Drives a program that is read and planned meanwhile.
-fn stream<const N: usize>(
-    arguments: &SendArguments,
-    (source, name): (Source, u32),
-    machine: &Machine<N>,
-    out: &mut dyn Write,
-) -> Result<Outcome, CliError> {
-    let port = &arguments.port;
-    if port.port == Port::Simulator {
-        let (mut connection, _board) = port.simulated(machine)?;
-        greet(&mut connection).map_err(|error| port.refused(error))?;
-        return stream_job::<f32, N, N>(arguments, (source, name), machine, connection, out);
-    }
-    on_axis_count!(machine.axis_count(), M => {
-        let mut connection = port.open::<M>()?;
-        greet(&mut connection).map_err(|error| port.refused(error))?;
-        if connection.identity().is_some_and(|identity| identity.is_fixed_point) {
-            return stream_job::<Fixed, N, M>(arguments, (source, name), machine, connection, out);
-        }
-        stream_job::<f32, N, M>(arguments, (source, name), machine, connection, out)
-    })
+/// A program that is read and planned while it is driven.
+struct Streamed<'a, const N: usize> {
+    arguments: &'a SendArguments,
+    source: Source,
+    /// The checksum of everything that its items are made of but the machine.
+    name: u32,
+    machine: &'a Machine<N>,
+    out: &'a mut dyn Write,
 }
 
-fn stream_job<R: Root + Send, const N: usize, const M: usize>(
-    arguments: &SendArguments,
-    (source, name): (Source, u32),
-    machine: &Machine<N>,
-    connection: Connection<M>,
-    out: &mut dyn Write,
-) -> Result<Outcome, CliError> {
-    holds_axes::<R, N>(machine)?;
-    let job = Job::<M>::in_planning(machine, 0);
-    let job = Job { name: job_name(name, job.machine), ..job };
-    let subject = Subject {
-        program_sum: Checksum::of(&source.text),
-        machine_sum: job.machine,
-        job: job.name,
-        session: connection.session(),
-        name: job.name,
-    };
-    let journal = Journal::open(arguments, &subject)?;
-    let lines = source.text.iter().filter(|&&byte| byte == b'\n').count() as u64;
-    let planned = InPlanning::begin::<R, N>(source, machine);
-    let driven = Driven {
-        job: &job,
-        planned: Some(planned),
-        found: found(arguments),
-        stops: Stops::default(),
-        middle: None,
-        journal,
-        lines,
-    };
-    drive(arguments, driven, machine, connection, out)
+impl<const N: usize> OnBoard for Streamed<'_, N> {
+    fn run<R: Root + Send, const M: usize>(self, connection: Connection<M>) -> Result<Outcome, CliError> {
+        let Self { arguments, source, name, machine, out } = self;
+        holds_axes::<R, N>(machine)?;
+        let job = Job::<M>::in_planning(machine, 0);
+        let job = Job { name: job_name(name, job.machine), ..job };
+        let subject = Subject {
+            program_sum: Checksum::of(&source.text),
+            machine_sum: job.machine,
+            job: job.name,
+            session: connection.session(),
+            name: job.name,
+        };
+        let journal = Journal::open(arguments, &subject)?;
+        let lines = source.text.iter().filter(|&&byte| byte == b'\n').count() as u64;
+        let planned = InPlanning::begin::<R, N>(source, machine);
+        let driven = Driven {
+            job: &job,
+            planned: Some(planned),
+            found: found(arguments),
+            stops: Stops::default(),
+            middle: None,
+            journal,
+            lines,
+        };
+        drive(arguments, driven, machine, connection, out)
+    }
 }
 
 /// The files that no output may replace.
@@ -275,30 +253,20 @@ fn holds_axes<R: Root, const N: usize>(machine: &Machine<N>) -> Result<(), CliEr
     axes.map(|_| ()).map_err(|source| CliError::Axis { machine: machine.name.clone(), source })
 }
 
-fn send_plan<const N: usize>(
-    sent: &Sent<'_>,
-    plan: &Plan<N>,
-    machine: &Machine<N>,
-    out: &mut dyn Write,
-) -> Result<Outcome, CliError> {
-    let port = &sent.arguments.port;
-    if port.port == Port::Simulator {
-        let job = job::<f32, N, N>(plan, machine)?;
-        let (mut connection, _board) = port.simulated(machine)?;
-        greet(&mut connection).map_err(|error| port.refused(error))?;
-        return send_job::<f32, N, N>(sent, (plan, job), machine, connection, out);
+/// A program that is planned.
+struct Planned<'a, const N: usize> {
+    sent: &'a Sent<'a>,
+    plan: &'a Plan<N>,
+    machine: &'a Machine<N>,
+    out: &'a mut dyn Write,
+}
+
+impl<const N: usize> OnBoard for Planned<'_, N> {
+    fn run<R: Root + Send, const M: usize>(self, connection: Connection<M>) -> Result<Outcome, CliError> {
+        let Self { sent, plan, machine, out } = self;
+        let job = job::<R, N, M>(plan, machine)?;
+        send_job::<R, N, M>(sent, (plan, job), machine, connection, out)
     }
-    on_axis_count!(machine.axis_count(), M => {
-        let job = job::<f32, N, M>(plan, machine)?;
-        let mut connection = port.open::<M>()?;
-        // The number type is the board's.
-        greet(&mut connection).map_err(|error| port.refused(error))?;
-        if connection.identity().is_some_and(|identity| identity.is_fixed_point) {
-            let job = self::job::<Fixed, N, M>(plan, machine)?;
-            return send_job::<Fixed, N, M>(sent, (plan, job), machine, connection, out);
-        }
-        send_job::<f32, N, M>(sent, (plan, job), machine, connection, out)
-    })
 }
 
 /// The plan as items, in the board's number type, if that holds its axes, too.
@@ -382,11 +350,7 @@ fn from_line_on<R: Root, const M: usize>(
         line,
         source,
     })?;
-    let job = whole.from_item::<R>(found.item).map_err(|(line, problem)| PlanningError {
-        source_name: name.clone(),
-        place: line.into(),
-        problem,
-    })?;
+    let job = whole.from_item::<R>(found.item).map_err(|problem| PlanningError::at_line(&name, problem))?;
     let why = match found.line {
         same if same == line => "",
         later if later > line => ", the next one with motion",
@@ -394,25 +358,6 @@ fn from_line_on<R: Root, const M: usize>(
     };
     let place = format!("begins at line {} of {name}{why}", found.line);
     Ok((job, Middle { place, tool: found.tool, is_confirmed: arguments.yes }))
-}
-
-/// Waits for the board's answer: what it is.
-pub(super) fn greet<const M: usize>(connection: &mut Connection<M>) -> Result<(), BoardError> {
-    let mut lost = None;
-    for _ in 0..200 {
-        connection.step(Duration::from_millis(50), &mut |heard| {
-            if let Heard::Lost(cause) = heard {
-                lost = Some(cause);
-            }
-        });
-        if connection.identity().is_some() {
-            return Ok(());
-        }
-        if let Some(cause) = lost.take() {
-            return Err(BoardError::Wire(io::Error::other(cause)));
-        }
-    }
-    Err(BoardError::Silent)
 }
 
 /// So long a board that only an operator can go on with is waited for where there is none.
@@ -479,12 +424,7 @@ fn drive_to_end<const N: usize, const M: usize>(
     };
     let names: Vec<String> = machine.driven_axes().iter().map(|axis| axis.name.clone()).collect();
     let Driven { job, planned, found, stops, middle, mut journal, lines } = driven;
-    let may = Permissions {
-        enables: arguments.enable,
-        clears_fault: arguments.clear_fault,
-        disables: arguments.disable,
-        found,
-    };
+    let may = arguments.drives.permissions(found);
     let items = planned.is_none().then_some(job.items.len());
     let mut sender = match planned {
         Some(planned) => Sender::planned(job, planned, &names, may),

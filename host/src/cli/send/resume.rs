@@ -14,7 +14,7 @@ use super::{SendArguments, job_name, send_program};
 use crate::board::{Connection, Job};
 use crate::cli::error::{CliError, Outcome};
 use crate::cli::input;
-use crate::cli::port::PortArguments;
+use crate::cli::port::{DriveArguments, PortArguments};
 use crate::cli::scope::ScopeArguments;
 use crate::gcode::{Program, StepKind};
 use crate::planning::PlanningError;
@@ -49,15 +49,8 @@ pub struct ResumeArguments {
     /// Confirm the first motion, for scripts.
     #[arg(long)]
     yes: bool,
-    /// Switch the drives on if they are off.
-    #[arg(long)]
-    enable: bool,
-    /// Clear a fault of the board before that.
-    #[arg(long, requires = "enable")]
-    clear_fault: bool,
-    /// Switch the drives off at the end.
-    #[arg(long)]
-    disable: bool,
+    #[command(flatten)]
+    drives: DriveArguments,
     #[command(flatten)]
     scope: ScopeArguments,
     /// Print lines of JSON, as `motion send` does.
@@ -116,8 +109,7 @@ pub(super) struct Resumed {
 /// # Errors
 /// The journal is refused, or what it is about is not the same any more; else those of [`send`](super::send).
 pub fn resume(arguments: &ResumeArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
-    let &ResumeArguments { ref journal, ref port, homed, yes, enable, clear_fault, disable, ref scope, json } =
-        arguments;
+    let &ResumeArguments { ref journal, ref port, homed, yes, drives, ref scope, json } = arguments;
     let path = match journal.clone().or_else(|| default_path(&port.port)) {
         Some(path) => path,
         None => {
@@ -144,9 +136,7 @@ pub fn resume(arguments: &ResumeArguments, out: &mut dyn Write) -> Result<Outcom
         from_line: None,
         stream: false,
         yes,
-        enable,
-        clear_fault,
-        disable,
+        drives,
         journal: Some(resumed.path.clone()),
         continues: false,
         restart: false,
@@ -189,11 +179,7 @@ impl Resumed {
         }
         let item = job.item_behind(record.driven);
         let name = record.program.display().to_string();
-        let rest = job.from_item::<R>(item).map_err(|(line, problem)| PlanningError {
-            source_name: name.clone(),
-            place: line.into(),
-            problem,
-        })?;
+        let rest = job.from_item::<R>(item).map_err(|problem| PlanningError::at_line(&name, problem))?;
         let begins =
             rest.line_of(0).map_or_else(|| "behind the path".to_owned(), |line| format!("at line {line}"));
         let place = format!("{name} was interrupted in line {}: goes on {begins}", record.line);
