@@ -33,13 +33,13 @@ const LONG: u32 = 7;
 const BEFORE: u32 = 300;
 
 /// A running emulator.
-struct Emulator {
+pub(crate) struct Emulator {
     running: Child,
     port: u16,
 }
 
 impl Emulator {
-    fn start(tools: &Tools, board: Board, record: &Bundle) -> Result<Self, String> {
+    pub(crate) fn start(tools: &Tools, board: Board, record: &Bundle) -> Result<Self, String> {
         let free = TcpListener::bind(("127.0.0.1", 0)).and_then(|listener| listener.local_addr());
         let port = free.map_err(|error| format!("a free port: {error}"))?.port();
         // What the board writes byte by byte is not to wait for anything.
@@ -51,7 +51,13 @@ impl Emulator {
         Ok(Self { running, port })
     }
 
-    fn connect(&mut self) -> Result<TcpStream, String> {
+    /// Where it takes connections, on this machine.
+    pub(crate) fn port(&self) -> u16 {
+        self.port
+    }
+
+    /// Waits until it takes a connection.
+    pub(crate) fn connect(&mut self) -> Result<TcpStream, String> {
         let since = Instant::now();
         loop {
             match TcpStream::connect(("127.0.0.1", self.port)) {
@@ -278,7 +284,7 @@ impl Program {
 }
 
 /// What a board is told about its machine: a program without items.
-fn record(program: &[u8]) -> Vec<u8> {
+pub(crate) fn record(program: &[u8]) -> Vec<u8> {
     let program = Reader::<AXES>::new(program).expect("a program");
     let guards = program.guards().expect("guards");
     let mut bytes = Vec::new();
@@ -287,7 +293,7 @@ fn record(program: &[u8]) -> Vec<u8> {
 }
 
 /// A number that other starts do not have.
-fn session() -> u32 {
+pub(crate) fn session() -> u32 {
     use std::hash::{BuildHasher, RandomState};
     RandomState::new().hash_one(0) as u32
 }

@@ -18,6 +18,7 @@ mod firmware;
 mod firmware_link;
 mod functions;
 mod image;
+mod killed;
 mod linked;
 mod preempted;
 mod programs;
@@ -33,7 +34,8 @@ use tools::Tools;
 type Test = fn(&Tools) -> Result<(), String>;
 
 /// Name, whether it holds figures that depend on the compiler, and the test. The longest first: others run beside it.
-const TESTS: [(&str, bool, Test); 16] = [
+const TESTS: [(&str, bool, Test); 17] = [
+    ("a_sender_is_killed", false, killed::a_sender_is_killed),
     ("estimated_cycles", true, cycles::estimated_cycles),
     ("the_firmware_runs", false, firmware::the_firmware_runs),
     ("a_pc_drives_the_firmware", false, firmware_link::a_pc_drives_the_firmware),
@@ -57,6 +59,9 @@ const TESTS: [(&str, bool, Test); 16] = [
 ];
 
 fn main() -> ExitCode {
+    if let Some(code) = killed::as_command() {
+        return code;
+    }
     let arguments = Arguments::from_args();
     let is_ci = std::env::var("CI").is_ok_and(|value| value == "true");
     let tools = Tools::find().map(Arc::new);
