@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use motion_tests::fuzz::{Laws, drive, drive_with, gcode};
+use motion_tests::fuzz::{Laws, drive, drive_with, gcode, link};
 use motion_tests::random::Random;
 
 /// Random inputs in a short run; `MOTION_TEST_PROGRAMS` has more.
@@ -39,6 +39,17 @@ fn random_bytes_keep_the_promises() {
         said += usize::from(drive(&bytes));
     }
     assert!(2 * said > inputs, "{said} of {inputs} inputs said anything");
+}
+
+#[test]
+fn random_bytes_keep_the_promises_of_the_link() {
+    let inputs = motion_tests::from_env("MOTION_TEST_PROGRAMS").map_or(INPUTS, |inputs| inputs as usize);
+    let mut random = Random::of_stream(63);
+    for input in 0..inputs {
+        let bytes: Vec<u8> = (0..random.below(600)).map(|_| random.bits() as u8).collect();
+        println!("input {input}");
+        link::drive(&bytes);
+    }
 }
 
 #[test]

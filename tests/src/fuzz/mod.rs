@@ -1,5 +1,5 @@
 //! The kernel and a machine, driven by bytes: what a fuzzer needs, and a test that reads its corpus. [`gcode`] is the same for
-//! the interpreter of G-code.
+//! the interpreter of G-code, [`link`] for the two ends of the link.
 //!
 //! Any bytes are a program with some of its items broken, a machine that answers as it should or as it likes, times at
 //! which items, the background and commands come. [`drive()`] runs them and panics where the kernel breaks a promise:
@@ -19,6 +19,7 @@
 pub mod gcode;
 mod items;
 mod judge;
+pub mod link;
 mod machine;
 mod runs;
 
