@@ -22,6 +22,7 @@ mod identify;
 mod jog;
 mod law;
 mod learning;
+mod link_rate;
 mod live;
 mod optimum;
 mod plan;
