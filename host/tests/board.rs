@@ -309,7 +309,7 @@ fn a_program_is_planned_while_it_is_driven() {
     let taken = connection.status().map(|status| status.taken);
     assert_eq!(taken, Some(whole.items.len() as u32 + 1));
 
-    // In the middle of a stretch, by a move that the machine can't make.
+    // In the middle of a stretch, by a move that the machine can't make: at rest before it.
     let mut narrow = machine.clone();
     narrow.axes[0].travel_mm = Some([-1.0, 100.0]);
     let source = Source {
@@ -323,7 +323,8 @@ fn a_program_is_planned_while_it_is_driven() {
         drive_sender(Sender::planned(&job, beyond, &names, ENABLES), &mut connection, |_, _, _| false);
     let Err(BoardError::Program(error)) = refused else { panic!("{refused:?}") };
     assert!(error.to_string().starts_with("part.ngc:4:"), "{error}");
-    assert!(stands(&connection)[0].to_mm() <= 2.1, "{:?}", stands(&connection));
+    assert_eq!(stands(&connection).map(Position::to_mm), [2.0, 1.0, 0.0]);
+    assert_eq!(connection.status().map(|status| status.state), Some(State::Idle));
 
     let wrong = text.replace("M2", "G1 X0 Y0\nG1 X5 Q");
     let sender = Sender::planned(&job, planned(&wrong), &names, ENABLES);

@@ -317,7 +317,7 @@ impl<const N: usize> Open<N> {
 }
 
 /// A problem that names the axis that it is about.
-fn named<const N: usize>(problem: Problem, axes: &[Option<Axis>; N]) -> Problem {
+pub(super) fn named<const N: usize>(problem: Problem, axes: &[Option<Axis>; N]) -> Problem {
     match problem {
         Problem::Geometry(CompileError::Coordinate { axis: place, mm: found }) => {
             axes.get(place).copied().flatten().map_or(problem, |axis| Problem::Coordinate { axis, found })

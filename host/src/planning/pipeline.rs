@@ -63,7 +63,7 @@ impl<'m, const N: usize> Pipeline<'m, N> {
     /// Takes moves that follow each other from rest to rest.
     pub(super) fn take_moves(&mut self, moves: Vec<Move<N>>, out: &mut Out<'_, N>) -> AtLine<()> {
         for step in moves {
-            self.runs.go([step]);
+            self.runs.go([step])?;
             if self.runs.waiting() >= self.together {
                 self.advance(out)?;
             }

@@ -134,18 +134,18 @@ impl<'m, const N: usize> Runs<'m, N> {
             move_at(line, element, feeds, mode, machine)
         };
         match &step.kind {
-            StepKind::Line(to) => self.go([path_move(Element::line(to, machine), to.feed, to.mode)]),
+            StepKind::Line(to) => self.go([path_move(Element::line(to, machine), to.feed, to.mode)])?,
             StepKind::Arc(arc) => {
                 let element = Element::arc(arc, machine).map_err(|error| at(error.into()))?;
-                self.go([path_move(element, arc.feed, arc.mode)]);
+                self.go([path_move(element, arc.feed, arc.mode)])?;
             }
             StepKind::Cubic(curve) => {
                 let element = cubic(curve, machine).map_err(at)?;
-                self.go([path_move(element, curve.feed, curve.mode)]);
+                self.go([path_move(element, curve.feed, curve.mode)])?;
             }
             StepKind::Nurbs(curve) => {
                 let elements = nurbs(curve, curves.get(curve.curve), machine).map_err(at)?;
-                self.go(elements.into_iter().map(|element| path_move(element, curve.feed, curve.mode)));
+                self.go(elements.into_iter().map(|element| path_move(element, curve.feed, curve.mode)))?;
             }
             StepKind::Through(point) => {
                 let (from, to) = (machine.coordinates(point.from), machine.coordinates(point.to));
@@ -161,11 +161,11 @@ impl<'m, const N: usize> Runs<'m, N> {
             StepKind::Probe(probe) => {
                 self.stop();
                 let ProbeMove { from, to, end, feed, .. } = *probe;
-                travel::check_end(end, machine).map_err(at)?;
+                travel::check_end(machine.coordinates(end), machine).map_err(at)?;
                 self.between(Between::Probe { line, probe: Box::new(*probe) });
                 if from != to {
                     let to = LineMove { from, to, feed, mode: PathMode::ExactStop };
-                    self.go([path_move(Element::line(&to, machine), feed, to.mode)]);
+                    self.go([path_move(Element::line(&to, machine), feed, to.mode)])?;
                 }
                 self.stop();
             }
@@ -204,16 +204,17 @@ impl<'m, const N: usize> Runs<'m, N> {
     pub(super) fn end_spline(&mut self) -> AtLine<()> {
         let stops = self.points.last().is_some_and(|point| point.mode == PathMode::ExactStop);
         let moves = through(self.start, &mut self.points, self.machine)?;
-        self.go(moves);
+        self.go(moves)?;
         if stops {
             self.stop();
         }
         Ok(())
     }
 
-    /// Takes moves.
-    pub(super) fn go(&mut self, moves: impl IntoIterator<Item = Move<N>>) {
+    /// Takes moves, up to one that leaves the travel.
+    pub(super) fn go(&mut self, moves: impl IntoIterator<Item = Move<N>>) -> AtLine<()> {
         for step in moves {
+            travel::check_move(&step.element, self.machine).map_err(|problem| (step.line, problem))?;
             self.run_s += self.time_s(&step);
             self.run.push(step);
             let is_long = self.run.len() > self.section && self.run_s > SECTION_S;
@@ -221,6 +222,7 @@ impl<'m, const N: usize> Runs<'m, N> {
                 self.cut();
             }
         }
+        Ok(())
     }
 
     /// The time of a move at its programmed feed \[s\].

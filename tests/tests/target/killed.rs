@@ -2,8 +2,8 @@
 //! is the board, now and then. `send --continue` or `resume`, in the next process, brings the program to its end.
 //!
 //! The process is this test's own executable, which is `motion` where [`COMMAND`] is set. When something is killed depends on
-//! the machine's clock; what is judged does not: every told position is on the path, none behind the place where motion could
-//! have been, and the end is exact.
+//! the machine's clock; what is judged does not: every told position is on the path, none goes on behind the place where motion
+//! was told to be, and the end is exact.
 //!
 //! ```text
 //! MOTION_TEST_KILLS=1000 cargo test -p motion-tests --test target a_sender_is_killed -- --nocapture
@@ -74,6 +74,16 @@ impl Way {
 
     fn end_mm(&self) -> f64 {
         self.0.last().map_or(0.0, |&[x, _]| x)
+    }
+
+    /// The line that leads to the last point, and that of the way at a place, the later one at a point between two.
+    fn last_line(&self) -> u64 {
+        self.0.len() as u64 + 1
+    }
+
+    fn line_at(&self, x_mm: f64) -> u64 {
+        let points = self.0.partition_point(|&[x, _]| x <= x_mm + PATH_MM);
+        (points as u64 + 2).min(self.last_line())
     }
 
     /// How far a position is from the way [mm].
@@ -168,15 +178,14 @@ impl Motion {
     }
 }
 
-/// Where motion may be.
+/// What was seen of a program, by all processes that drove it.
 struct Seen<'a> {
     way: &'a Way,
-    /// Where it was told to be last, and when.
+    /// Where it was told to be last.
     at_mm: f64,
-    told: Instant,
-    /// It has not come further than here, where that is known: the board was killed.
-    ends_mm: Option<f64>,
-    /// A program is under way in this process.
+    /// The last program line that it may go on at, in a process that tells where it does.
+    until_line: u64,
+    /// This process drives the program.
     is_begun: bool,
     /// All is driven.
     is_done: bool,
@@ -185,15 +194,27 @@ struct Seen<'a> {
 impl<'a> Seen<'a> {
     /// Before the program.
     fn new(way: &'a Way) -> Self {
-        Self { way, at_mm: 0.0, told: Instant::now(), ends_mm: None, is_begun: false, is_done: false }
+        Self { way, at_mm: 0.0, until_line: 0, is_begun: false, is_done: false }
     }
 
-    /// Motion may have come so far by now: it goes on while nobody is told [mm].
-    fn reach_mm(&self) -> f64 {
-        self.ends_mm.unwrap_or_else(|| self.at_mm + FEED_MM_S * self.told.elapsed().as_secs_f64())
+    /// The next process goes on from `journal`: not behind the place that it was told last, where motion has been.
+    fn resumes(&mut self, journal: &str) -> Result<(), String> {
+        // Where there is none yet, nothing goes on.
+        let Ok(text) = std::fs::read_to_string(journal) else { return Ok(()) };
+        let record: Value = serde_json::from_str(&text).map_err(|error| format!("{journal}: {error}"))?;
+        self.until_line = self.way.line_at(record["set_mm"][0].as_f64().unwrap_or(0.0));
+        Ok(())
     }
 
     fn take(&mut self, line: &Value) -> Result<(), String> {
+        if let Some((_, place)) = line["text"].as_str().and_then(|text| text.split_once(": goes on ")) {
+            let begins = place.strip_prefix("at line ").map_or(Ok(u64::MAX), str::parse);
+            let begins = begins.map_err(|error| error.to_string())?;
+            // Behind the path, all of it is driven.
+            if begins > self.until_line && (begins < u64::MAX || self.until_line < self.way.last_line()) {
+                return Err(format!("it was in line {}: path is left out", self.until_line));
+            }
+        }
         self.is_done |= line["step"] == "done";
         let set = [&line["set_mm"][0], &line["set_mm"][1]].map(Value::as_f64);
         let ("program" | "done", [Some(x), Some(y)]) = (line["step"].as_str().unwrap_or_default(), set)
@@ -204,14 +225,10 @@ impl<'a> Seen<'a> {
         if off_mm > PATH_MM {
             return Err(format!("{off_mm} mm off the path"));
         }
-        let reach_mm = self.reach_mm();
-        if x > reach_mm + PATH_MM {
-            return Err(format!("further than {reach_mm} mm: path was left out"));
-        }
         if self.is_begun && x < self.at_mm - PATH_MM {
             return Err(format!("behind {} mm: it goes back", self.at_mm));
         }
-        (self.is_begun, self.at_mm, self.told, self.ends_mm) = (true, x, Instant::now(), None);
+        (self.is_begun, self.at_mm) = (true, x);
         Ok(())
     }
 }
@@ -266,6 +283,9 @@ fn kills(tools: &Tools, board: Board, kills: u64) -> Result<Tally, String> {
                 seen = Seen::new(&way);
             }
             seen.is_begun = false;
+            if how == "resumed" {
+                seen.resumes(journal)?;
+            }
             let kill_after = (tally.kills < kills && random.chance(0.7))
                 .then(|| Duration::from_secs_f64(random.between(0.05, 3.0)));
             let ended = Motion::start(&words)?.until(kill_after, &mut |line| seen.take(line))?;
@@ -276,7 +296,6 @@ fn kills(tools: &Tools, board: Board, kills: u64) -> Result<Tally, String> {
                     if is_reset {
                         tally.boards += 1;
                         drop(running);
-                        seen.ends_mm = Some(seen.reach_mm());
                         running = start()?;
                     }
                     how = if is_reset || random.chance(0.5) { "resumed" } else { "continued" };

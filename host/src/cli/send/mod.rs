@@ -102,9 +102,9 @@ pub struct SendArguments {
     /// Give up what the board has of a program.
     #[arg(long)]
     restart: bool,
-    /// Begin at once: the program is read and planned while it is driven. A line that can't be read ends the motion at rest before
-    /// it; one that can't be driven, such as beyond the travel, aborts the program before it. Between G41 or G42 and G40 nothing
-    /// is known to be final. Without this option all is planned before anything moves.
+    /// Begin at once: the program is read and planned while it is driven. A line that can't be read, or is beyond the travel, ends
+    /// the motion at rest before it. Between G41 or G42 and G40 nothing is known to be final. Without this option all is planned
+    /// before anything moves.
     #[arg(long, conflicts_with = "from_line")]
     stream: bool,
     /// Leave out the words of spindle and coolant that the machine has no output for.
