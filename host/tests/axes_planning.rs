@@ -557,7 +557,7 @@ fn refusals_name_the_axis_and_its_unit() {
     let refused = plan_program("test.ngc", &program, &machine, Mode::Spanning).map(|_| ());
     let refused = refused.expect_err("beyond").to_string();
     assert!(
-        refused.starts_with("test.ngc:1: found C at 9")
+        refused.starts_with("test.ngc:1: found C at 120")
             && refused.ends_with(" °, expected its travel, -90 to 90 °"),
         "{refused}"
     );

@@ -151,7 +151,12 @@ fn the_forms_say_the_same() {
         let cells: Vec<&str> = lines[index + 1].split(',').collect();
         assert_eq!(cells[5].parse::<f64>().ok(), row["time_s"].as_f64());
         let time = format!("{:.4}", row["time_s"].as_f64().expect("a time"));
-        assert!(table.lines().any(|line| line.contains(path) && line.contains(&time)), "{table}");
+        // A line for each value, a column for each path.
+        let cell = |name: &str| {
+            let line = table.lines().find_map(|line| line.trim_start().strip_prefix(name)).expect(name);
+            line.split("  ").map(str::trim).filter(|cell| !cell.is_empty()).nth(index).map(str::to_owned)
+        };
+        assert_eq!((cell("path"), cell("time [s]")), (Some(path.to_owned()), Some(time)), "{table}");
     }
 }
 

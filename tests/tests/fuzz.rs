@@ -42,6 +42,19 @@ fn random_bytes_keep_the_promises() {
 }
 
 #[test]
+fn every_seed_of_the_link_keeps_its_promises() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/link");
+    let mut inputs = 0;
+    for entry in std::fs::read_dir(&folder).expect("a corpus") {
+        let path = entry.expect("an entry").path();
+        println!("{}", path.display());
+        link::drive(&std::fs::read(&path).expect("a seed"));
+        inputs += 1;
+    }
+    assert!(inputs >= 50, "{inputs} seeds");
+}
+
+#[test]
 fn random_bytes_keep_the_promises_of_the_link() {
     let inputs = motion_tests::from_env("MOTION_TEST_PROGRAMS").map_or(INPUTS, |inputs| inputs as usize);
     let mut random = Random::of_stream(63);

@@ -6,12 +6,15 @@ use std::time::{Duration, Instant};
 use motion_kernel::link::{Controls, Event, FRAME_MAX, HostLink, Identity, Mode, PushError, Status};
 use motion_kernel::program::Item;
 
+use super::error::BoardError;
 use super::scope::{Scope, ScopeSummary};
 use super::wire::Wire;
 
 /// Items that wait for a board's confirmation, and their bytes.
 const ITEMS: usize = 256;
 const BYTES: usize = 64 * 1024;
+/// The longest time for a board's first answer.
+pub(super) const ANSWER: Duration = Duration::from_secs(10);
 /// A broken wire is opened again after this time.
 const REOPEN_AFTER: Duration = Duration::from_millis(500);
 /// A board that has answered does so ten times a second and more: after this time it is not there.
@@ -85,6 +88,28 @@ impl<const N: usize> Connection<N> {
             self.wire = None;
             self.lose(cause.to_string(), on_heard);
         }
+    }
+
+    /// Waits for the board's answer: what it is.
+    ///
+    /// # Errors
+    /// It has not answered in 10 s, or the wire is broken.
+    pub fn greet(&mut self) -> Result<(), BoardError> {
+        let (begin, mut lost) = (Instant::now(), None);
+        while self.identity.is_none() {
+            if begin.elapsed() > ANSWER {
+                return Err(BoardError::Silent);
+            }
+            self.step(Duration::from_millis(50), &mut |heard| {
+                if let Heard::Lost(cause) = heard {
+                    lost = Some(cause);
+                }
+            });
+            if let Some(cause) = lost.take() {
+                return Err(BoardError::Wire(io::Error::other(cause)));
+            }
+        }
+        Ok(())
     }
 
     /// Until the board has confirmed what the operator wants, or for a second; whether it has.
@@ -299,5 +324,69 @@ impl<const N: usize> Connection<N> {
         let taken = self.status().map(|status| (status.state, status.taken));
         let runs = self.link.controls().mode == Mode::Run && self.link.is_controlled();
         runs && self.link.waiting() == 0 && taken == Some((Idle, self.link.confirmed()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use motion_kernel::hal::BoardOutputs;
+    use motion_kernel::link::{BoardLink, ItemQueue, PROTOCOL};
+    use motion_kernel::program::FORMAT;
+
+    use super::*;
+
+    /// A board that still tells somebody else what it does, byte by byte, and answers after that.
+    struct Talkative {
+        board: BoardLink,
+        items: ItemQueue<3, 4>,
+        /// Bytes of before.
+        old: usize,
+        answers: VecDeque<u8>,
+    }
+
+    impl Wire for Talkative {
+        fn read(&mut self, bytes: &mut [u8], _: Duration) -> io::Result<usize> {
+            if self.old > 0 {
+                self.old -= 1;
+                bytes[0] = if self.old.is_multiple_of(60) { 0 } else { 7 };
+                return Ok(1);
+            }
+            if self.answers.is_empty() {
+                let mut frame = [0; FRAME_MAX];
+                let length = self.board.transmit(0, &self.items, None, &mut frame);
+                self.answers.extend(&frame[..length]);
+            }
+            bytes[0] = self.answers.pop_front().unwrap_or(0);
+            Ok(1)
+        }
+
+        fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+            self.board.receive(&mut bytes.iter().copied());
+            Ok(())
+        }
+    }
+
+    /// The answer is waited for by time, however many bytes come before it.
+    #[test]
+    fn an_answer_behind_many_bytes_is_found() {
+        let identity = Identity {
+            protocol: PROTOCOL,
+            format: FORMAT.into(),
+            axes: 3,
+            is_fixed_point: false,
+            tick_s: 5e-4,
+            items: 4,
+            outputs: BoardOutputs::None,
+            machine: 1,
+        };
+        let board = BoardLink::new(1, identity);
+        let wire = Talkative { board, items: ItemQueue::new(), old: 100_000, answers: VecDeque::new() };
+        let mut wire = Some(Box::new(wire) as Box<dyn Wire>);
+        let open = Box::new(move || wire.take().ok_or_else(|| io::ErrorKind::BrokenPipe.into()));
+        let mut connection = Connection::<3>::open(open, 7).expect("a wire");
+        assert!(connection.greet().is_ok());
+        assert_eq!(connection.identity(), Some(&identity));
     }
 }

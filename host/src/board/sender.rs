@@ -12,14 +12,12 @@ use motion_kernel::program::{FORMAT, Item};
 use motion_kernel::straight::Straight;
 use motion_kernel::units::Position;
 
-use super::connection::{Connection, Heard};
+use super::connection::{ANSWER, Connection, Heard};
 use super::error::{Agreement, BoardError};
 use super::items::{InPlanning, Items, Next, Said};
 use super::job::Job;
 use crate::simulate::faults;
 
-/// The longest time for an answer.
-const ANSWER: Duration = Duration::from_secs(10);
 /// The longest time for drives to go on.
 const ENABLE: Duration = Duration::from_secs(5);
 /// The longest time for an abort: a stop from any feed, and a busy board.

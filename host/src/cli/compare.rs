@@ -22,7 +22,7 @@ Examples:
   motion compare parts/ --tolerance 0.01 --tolerance 0.05 --csv > times.csv
       every .ngc file of a folder, with blends of two tolerances
 
-Columns: `blends` counts blends and curves; `per block` is the time with one pair of sin² ramps per block, the
+Values: `blends` counts blends and curves; `per block` is the time with one pair of sin² ramps per block, the
 published plan, whatever the machine's law is; `least` is the time on the same path without limits of jerk and
 snap along it, but under the ceilings that they make, a lower bound for every plan; `accel. alone` is the time
 on it under programmed feeds and acceleration alone; `tolerance` is the greatest share of the tolerance that the
@@ -137,7 +137,7 @@ pub fn compare(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outc
     } else if arguments.json {
         write_json(&CompareJson { rows: &rows, refused: &refused }, out)?;
     } else {
-        write_table(&rows, out).map_err(CliError::Output)?;
+        write_tables(&rows, out).map_err(CliError::Output)?;
     }
     if refused.is_empty() { Ok(Outcome::Done) } else { Err(CliError::Refused { programs: refused }) }
 }
@@ -191,44 +191,41 @@ fn write_csv(rows: &[Row], out: &mut dyn Write) -> Result<(), CliError> {
     csv.flush().map_err(CliError::Output)
 }
 
+/// So many paths stand beside each other: lines have no more than 100 columns.
+const BESIDE: usize = 5;
+
+/// Writes a table for each program: a line for each value, a column for each path.
+fn write_tables(rows: &[Row], out: &mut dyn Write) -> io::Result<()> {
+    for (index, of_program) in rows.chunk_by(|one, next| one.program == next.program).enumerate() {
+        let gap = if index > 0 { "\n" } else { "" };
+        let name = of_program.first().map_or("", |row| row.program.as_str());
+        writeln!(out, "{gap}{name}")?;
+        of_program.chunks(BESIDE).try_for_each(|rows| write_table(rows, out))?;
+    }
+    Ok(())
+}
+
 fn write_table(rows: &[Row], out: &mut dyn Write) -> io::Result<()> {
-    let columns = [
-        ("program", "", Align::Left),
-        ("path", "", Align::Left),
-        ("blocks", "", Align::Right),
-        ("blends", "", Align::Right),
-        ("length", "mm", Align::Right),
-        ("time", "s", Align::Right),
-        ("per block", "s", Align::Right),
-        ("least", "s", Align::Right),
-        ("accel. alone", "s", Align::Right),
-        ("tolerance", "%", Align::Right),
-        ("feed", "%", Align::Right),
-        ("accel", "%", Align::Right),
-        ("jerk", "%", Align::Right),
-        ("step", "%", Align::Right),
+    let paths = rows.iter().map(|row| (row.path.as_str(), "", Align::Right));
+    let columns: Vec<_> = [("path", "", Align::Left)].into_iter().chain(paths).collect();
+    let value = |name: &str, of: &dyn Fn(&Row) -> String| -> Vec<String> {
+        [name.to_owned()].into_iter().chain(rows.iter().map(of)).collect()
+    };
+    let time = |name: &str, of: fn(&Row) -> f64| value(name, &|row| format!("{:.4}", of(row)));
+    let percent = |name: &str, of: fn(&Row) -> f64| value(name, &|row| format!("{:.1}", 100.0 * of(row)));
+    let lines = [
+        value("blocks", &|row| row.blocks.to_string()),
+        value("blends", &|row| row.blends.to_string()),
+        value("length [mm]", &|row| format!("{:.3}", row.length_mm)),
+        time("time [s]", |row| row.time_s),
+        time("per block [s]", |row| row.per_block_s),
+        time("least [s]", |row| row.least_s),
+        time("accel. alone [s]", |row| row.acceleration_s),
+        percent("tolerance [%]", |row| row.tolerance_share),
+        percent("feed [%]", |row| row.feed_ratio),
+        percent("accel. [%]", |row| row.accel_ratio),
+        percent("jerk [%]", |row| row.jerk_ratio),
+        percent("step [%]", |row| row.accel_step_ratio),
     ];
-    let percent = |ratio: f64| format!("{:.1}", 100.0 * ratio);
-    let cells: Vec<[String; 14]> = rows
-        .iter()
-        .map(|row| {
-            [
-                row.program.clone(),
-                row.path.clone(),
-                row.blocks.to_string(),
-                row.blends.to_string(),
-                format!("{:.3}", row.length_mm),
-                format!("{:.4}", row.time_s),
-                format!("{:.4}", row.per_block_s),
-                format!("{:.4}", row.least_s),
-                format!("{:.4}", row.acceleration_s),
-                percent(row.tolerance_share),
-                percent(row.feed_ratio),
-                percent(row.accel_ratio),
-                percent(row.jerk_ratio),
-                percent(row.accel_step_ratio),
-            ]
-        })
-        .collect();
-    table::write(&columns, &cells, out)
+    table::write(&columns, &lines, out)
 }

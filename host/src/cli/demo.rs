@@ -32,7 +32,7 @@ pub fn demonstrate(out: &mut dyn Write) -> Result<Outcome, CliError> {
         say(&format!("  {line}"))?;
     }
     say("\nPlan: what limits the feed\n")?;
-    plan::write_plan(&plan, out).map_err(CliError::Output)?;
+    plan::write_plan(&plan, usize::MAX, out).map_err(CliError::Output)?;
     let (summary, written) = run::execute(&RunOptions::default(), &plan, &machine, outputs, None)?;
     let mut say = |text: &str| writeln!(out, "{text}").map_err(CliError::Output);
     say("\nRun: the real-time kernel on simulated axes\n")?;

@@ -100,7 +100,7 @@ pub enum CliError {
         source: ResumeError,
     },
     /// A folder can't be read.
-    #[error("{path}: found {source}, expected a folder that can be read")]
+    #[error("{path}: found {source}, expected a folder that can be used")]
     Folder {
         /// The path, as the user gave it.
         path: String,
@@ -227,6 +227,14 @@ pub enum CliError {
     Refused {
         /// Why, one by one.
         programs: Vec<String>,
+    },
+    /// There is no such column.
+    #[error("found the column {found}, expected one of {expected}")]
+    Column {
+        /// The name.
+        found: String,
+        /// Those that there are.
+        expected: String,
     },
     /// Arguments that are right one by one but don't fit together.
     #[error("found {found}, expected {expected}")]

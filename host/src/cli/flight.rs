@@ -8,6 +8,7 @@ use clap::Args;
 use super::error::{CliError, Outcome};
 use super::input::{self, Source};
 use super::outputs::Outputs;
+use super::trace::TraceArguments;
 use crate::files::Files;
 use crate::flight;
 use crate::machine::{Machine, on_machine};
@@ -33,9 +34,8 @@ pub struct FlightArguments {
     /// Machine file, for the tick and the axes' names; without it, the reference machine.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
-    /// Write every tick as a row of CSV; an existing file is replaced.
-    #[arg(long, value_name = "FILE.csv")]
-    trace: Option<PathBuf>,
+    #[command(flatten)]
+    trace: TraceArguments,
     /// Write a self-contained HTML page; an existing file is replaced.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -48,7 +48,9 @@ pub struct FlightArguments {
 pub fn flight(arguments: &FlightArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let mut files =
         Files::reading([("LOG", Some(arguments.log.as_path())), ("--machine", arguments.machine.as_deref())]);
-    let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), arguments.report.as_ref())?;
+    let outputs = Outputs::open(&mut files, &arguments.trace, arguments.report.as_ref(), false)?;
+    let mut printed = outputs.printed(out);
+    let out = &mut *printed;
     let machine = input::any_machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.log)?;
     on_machine!(machine, machine => show(machine, source, outputs, out))
@@ -78,7 +80,7 @@ fn show<const N: usize>(
     for (axis, settings) in trace.axes.iter_mut().zip(machine.driven_axes()) {
         axis.following_error_limit_um = settings.following_error_limit_mm * 1e3;
     }
-    let written = outputs.of_trace(&info, &trace);
+    let written = outputs.of_trace(&info, &trace)?;
     for line in &trace.notices {
         writeln!(out, "  {line}").map_err(CliError::Output)?;
     }

@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::error::{CliError, Outcome};
 use super::outputs::Outputs;
 use super::table::{self, Align};
+use super::trace::TraceArguments;
 use super::units::{InUnit, TableUnits};
 use super::{input, write_json};
 use crate::files::Files;
@@ -37,9 +38,8 @@ pub struct HomeArguments {
     /// Machine file; `motion machine` prints one, with the keys of homing commented out.
     #[arg(long, value_name = "FILE")]
     machine: PathBuf,
-    /// Write every tick as a row of CSV; an existing file is replaced.
-    #[arg(long, value_name = "FILE.csv")]
-    trace: Option<PathBuf>,
+    #[command(flatten)]
+    trace: TraceArguments,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -61,7 +61,9 @@ struct AxisJson<'a> {
 /// The machine file is refused or homes no axis, an axis is not homed, or a file can't be written.
 pub fn run(arguments: &HomeArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let mut files = Files::reading([("--machine", Some(arguments.machine.as_path()))]);
-    let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), None)?;
+    let outputs = Outputs::open(&mut files, &arguments.trace, None, arguments.json)?;
+    let mut printed = outputs.printed(out);
+    let out = &mut *printed;
     let machine = input::any_machine(Some(&arguments.machine))?;
     on_machine!(machine, machine => home(machine, arguments, outputs, out))
 }
@@ -77,7 +79,7 @@ fn home<const N: usize>(
     let homes = Homes::new(machine).map_err(refused)?;
     let mut homed = Vec::new();
     let info = RunInfo::of_machine(machine);
-    let (ended, ticks) = outputs.of_ticks(&info, |observe| homes.home(&mut homed, observe));
+    let (ended, ticks) = outputs.of_ticks(&info, |observe| homes.home(&mut homed, observe))?;
     // Axes already homed are written and shown, even if the next axis failed.
     let written = ticks.write(|_| info.empty_trace());
     if arguments.json {

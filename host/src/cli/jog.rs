@@ -11,7 +11,8 @@ use super::error::{CliError, Outcome};
 use super::outputs::Outputs;
 use super::port::{OnBoard, OptionalPort, PortArguments};
 use super::table::{self, Align};
-use super::units::{InUnit, TableUnits};
+use super::trace::TraceArguments;
+use super::units::{InUnit, TableUnits, feed_per_s};
 use super::{input, write_json};
 use crate::board::jog::Jogs;
 use crate::board::sender::{Found, Permissions};
@@ -24,11 +25,11 @@ use crate::simulate::jog::{Ended, Jogged, Keys, Press};
 const EXAMPLES: &str = "\
 Examples:
   motion jog X+20 Y-2.5               by an increment [mm; degrees for rotary axes]
-  motion jog X+20@300 --feed 50       the key is released after 300 ticks
+  motion jog X+20@300 --feed 3000       the key is released after 300 ticks
   motion jog X+ X- --machine mine.toml
                                       from one soft limit, [axis.travel], to the other
   motion jog X+20 --trace jog.csv     every tick, for a spreadsheet
-  motion jog X+20 --port /dev/ttyACM0 --feed 5
+  motion jog X+20 --port /dev/ttyACM0 --feed 300
                                       on a board; Ctrl-C releases the key
 
 A board holds by itself where nothing comes from this command for the time of --dead-man: the PC or the cable may fail.
@@ -49,8 +50,8 @@ pub struct JogArguments {
     /// release.
     #[arg(value_name = "KEY", required = true)]
     presses: Vec<Press>,
-    /// Feed, mm/s or degrees/s; without it, the axis' greatest.
-    #[arg(long, value_name = "MM_S")]
+    /// Feed, in mm/min or degrees/min, or with its unit: 50mm/s, 10deg/s. Without it, the axis' greatest.
+    #[arg(long, value_name = "FEED", value_parser = feed_per_s, allow_negative_numbers = true)]
     feed: Option<f64>,
     /// Machine file (`motion machine` prints one); without it, the reference machine.
     #[arg(long, value_name = "FILE")]
@@ -66,9 +67,8 @@ pub struct JogArguments {
     /// On a board: give up what it has of a program.
     #[arg(long, requires = "port")]
     restart: bool,
-    /// Write every tick as a row of CSV; an existing file is replaced.
-    #[arg(long, value_name = "FILE.csv", conflicts_with = "port")]
-    trace: Option<PathBuf>,
+    #[command(flatten)]
+    trace: TraceArguments,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -125,7 +125,9 @@ impl PressJson {
 /// The machine file or a key is refused, a fault ended a jog, or a file can't be written.
 pub fn run(arguments: &JogArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let mut files = Files::reading([("--machine", arguments.machine.as_deref())]);
-    let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), None)?;
+    let outputs = Outputs::open(&mut files, &arguments.trace, None, arguments.json)?;
+    let mut printed = outputs.printed(out);
+    let out = &mut *printed;
     let machine = input::any_machine(arguments.machine.as_ref())?;
     on_machine!(machine, machine => jog(machine, arguments, outputs, out))
 }
@@ -138,11 +140,18 @@ fn jog<const N: usize>(
 ) -> Result<Outcome, CliError> {
     let keys = Keys::new(machine, &arguments.presses, arguments.feed)?;
     if let Some(port) = arguments.port.given() {
+        if arguments.trace.trace.is_some() {
+            let found = "--trace with --port".to_owned();
+            return Err(CliError::Arguments {
+                found,
+                expected: "one of them: `motion watch --scope` traces a board",
+            });
+        }
         return jog_on_board(machine, arguments, (&port, &keys), out);
     }
     let mut jogged = Vec::new();
     let info = RunInfo::of_machine(machine);
-    let (ended, ticks) = outputs.of_ticks(&info, |observe| keys.jog(&mut jogged, observe));
+    let (ended, ticks) = outputs.of_ticks(&info, |observe| keys.jog(&mut jogged, observe))?;
     // Finished jogs are written and shown, even if the next key failed.
     let written = ticks.write(|_| info.empty_trace());
     show(&jogged, machine.tick_s, arguments.json, out)?;

@@ -39,6 +39,7 @@
 //! - [`jog`]: presses and releases jog keys of the simulated machine;
 //! - [`machine`]: the reference machine's file, and the meaning of its keys;
 //! - [`demo`]: `motion` without a command;
+//! - [`help`]: the list of commands, completions of shells, man pages;
 //! - [`error`]: errors and exit statuses;
 //! - `input`, `outputs`, `port`, `until_closed`, `table`, `trace`, `units`, `progress`: shared by the commands.
 
@@ -50,6 +51,7 @@ pub mod demo;
 pub mod drive;
 pub mod error;
 pub mod flight;
+pub mod help;
 pub mod home;
 pub mod jog;
 pub mod machine;
@@ -76,11 +78,14 @@ mod until_closed;
 use std::io::{self, BufWriter, Write};
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use self::error::{CliError, Outcome};
 use self::until_closed::UntilClosed;
 use crate::files::interrupt;
+
+/// Columns of help: examples are laid out for them.
+const HELP_WIDTH: usize = 120;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -104,7 +109,7 @@ Examples:
                                                  what the board and the file have not in common
   motion board                                   the simulated machine as a board, behind an address
   motion home --machine mine.toml                the axes find their references
-  motion jog X+20 Y-2.5@300 --feed 50            press keys, release one after 300 ticks
+  motion jog X+20 Y-2.5@300 --feed 3000          press keys, release one after 300 ticks
   motion machine > mine.toml                     a machine file to start from
   motion machine --explain                       the meaning of its keys
 
@@ -150,13 +155,25 @@ enum Command {
     Home(home::HomeArguments),
     Jog(jog::JogArguments),
     Machine(machine::MachineArguments),
+    Completions(help::CompletionsArguments),
+    Man(help::ManArguments),
+}
+
+/// The arguments, as they are.
+fn plain_command() -> clap::Command {
+    Cli::command().term_width(HELP_WIDTH)
+}
+
+/// The arguments, with a list of commands by purpose.
+fn command() -> clap::Command {
+    help::grouped(plain_command())
 }
 
 /// The whole program: arguments to exit status.
 #[must_use]
 pub fn main() -> ExitCode {
     interrupt::watch();
-    let cli = Cli::parse();
+    let cli = Cli::from_arg_matches(&command().get_matches()).unwrap_or_else(|error| error.exit());
     let mut out = BufWriter::new(UntilClosed::new(io::stdout().lock()));
     let done = execute(&cli, &mut out);
     // Output printed before an error must appear before it.
@@ -193,6 +210,8 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
         Some(Command::Home(arguments)) => home::run(arguments, out),
         Some(Command::Jog(arguments)) => jog::run(arguments, out),
         Some(Command::Machine(arguments)) => machine::print(arguments, out),
+        Some(Command::Completions(arguments)) => help::completions(arguments, out),
+        Some(Command::Man(arguments)) => help::man(arguments, out),
     }
 }
 
@@ -212,10 +231,8 @@ fn csv_failure(error: csv::Error) -> io::Error {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     #[test]
     fn the_arguments_are_consistent() {
-        super::Cli::command().debug_assert();
+        super::command().debug_assert();
     }
 }

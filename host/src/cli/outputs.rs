@@ -5,7 +5,8 @@ use std::path::PathBuf;
 
 use super::error::{CliError, Outcome};
 use super::progress::Progress;
-use super::trace::TraceWriter;
+use super::trace::{TraceArguments, TraceWriter};
+use super::until_closed::UntilClosed;
 use crate::files::{Failure, Files, FilesError, OutputFile};
 use crate::report;
 use crate::simulate::{Job, Observer, RunError, RunInfo, RunSummary};
@@ -26,6 +27,8 @@ pub(super) fn open(
 pub(super) struct Written {
     files: Vec<(&'static str, String)>,
     failures: Vec<FilesError>,
+    /// Why a trace did not get to standard output.
+    printed: Option<io::Error>,
 }
 
 impl Written {
@@ -65,29 +68,84 @@ impl Written {
 
     /// The command's outcome, unless a file was not written.
     pub(super) fn outcome(self, outcome: Outcome) -> Result<Outcome, CliError> {
+        let printed = self.printed.map(|failure| Err(CliError::Output(failure)));
         let failures = self.failures.into_iter().map(|failure| Err(CliError::Unwritten(failure)));
-        CliError::all(failures.chain([Ok(outcome)]))
+        CliError::all(printed.into_iter().chain(failures).chain([Ok(outcome)]))
     }
 }
 
 /// The files asked for, opened early: a wrong path should not cost the user a long run.
 pub(super) struct Outputs {
-    trace: Option<OutputFile>,
+    trace: Option<TraceOutput>,
+    /// What of it.
+    of_trace: TraceArguments,
     report: Option<OutputFile>,
 }
 
+/// Where a trace goes.
+enum TraceOutput {
+    File(OutputFile),
+    Standard(UntilClosed<io::Stdout>),
+}
+
+impl TraceOutput {
+    /// A file gets its name.
+    fn commit(self) -> Result<(), FilesError> {
+        match self {
+            Self::File(file) => file.commit(),
+            Self::Standard(_) => Ok(()),
+        }
+    }
+}
+
+impl Write for TraceOutput {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::File(file) => file.write(bytes),
+            Self::Standard(out) => out.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::File(file) => file.flush(),
+            Self::Standard(out) => out.flush(),
+        }
+    }
+}
+
 impl Outputs {
+    /// A trace on standard output leaves no place for JSON there.
     pub(super) fn open(
         files: &mut Files,
-        trace: Option<&PathBuf>,
+        of_trace: &TraceArguments,
         report: Option<&PathBuf>,
-    ) -> Result<Self, FilesError> {
-        Ok(Self { trace: open(files, "--trace", trace)?, report: open(files, "--report", report)? })
+        is_json: bool,
+    ) -> Result<Self, CliError> {
+        let trace = if of_trace.is_standard() {
+            if is_json {
+                let found = "--trace - with --json".to_owned();
+                return Err(CliError::Arguments { found, expected: "one of them on standard output" });
+            }
+            Some(TraceOutput::Standard(UntilClosed::new(io::stdout())))
+        } else {
+            open(files, "--trace", of_trace.trace.as_ref())?.map(TraceOutput::File)
+        };
+        Ok(Self { trace, of_trace: of_trace.clone(), report: open(files, "--report", report)? })
+    }
+
+    /// Where the rest of a command's output goes: nowhere, where the trace has standard output.
+    pub(super) fn printed<'a>(&self, out: &'a mut dyn Write) -> Box<dyn Write + 'a> {
+        match self.trace {
+            Some(TraceOutput::Standard(_)) => Box::new(io::sink()),
+            _ => Box::new(out),
+        }
     }
 
     /// Only the report; `role` names its option.
     pub(super) fn report(files: &mut Files, role: &'static str, path: PathBuf) -> Result<Self, FilesError> {
-        Ok(Self { trace: None, report: open(files, role, Some(&path))? })
+        let of_trace = TraceArguments::default();
+        Ok(Self { trace: None, of_trace, report: open(files, role, Some(&path))? })
     }
 
     /// Runs a job with `run` and writes the files about it. A run that can't be made leaves no files.
@@ -97,7 +155,7 @@ impl Outputs {
         run: impl FnOnce(&mut Observer<'_, N>) -> Result<T, RunError>,
         summary_of: impl Fn(&T) -> &RunSummary,
     ) -> Result<(T, Written), CliError> {
-        let (ran, ticks) = self.of_ticks(&job.info, |observe| {
+        let (ran, ticks) = self.of_ticks(&job.info, |observe: &mut Observer<'_, N>| {
             let mut progress = Progress::new((job.info.planned_time_s / job.info.tick_s) as u64);
             let ran = run(&mut |tick| {
                 observe(tick);
@@ -105,16 +163,20 @@ impl Outputs {
             });
             progress.finish();
             ran
-        });
+        })?;
         let ran = ran.map_err(|source| CliError::Run { program: job.info.program.clone(), source })?;
         let written = ticks.write(|ticks| trace_of(job, summary_of(&ran), ticks));
         Ok((ran, written))
     }
 
     /// Writes the files about an existing trace.
-    pub(super) fn of_trace<const N: usize>(self, info: &RunInfo, trace: &RunTrace<N>) -> Written {
-        let ((), ticks) = self.of_ticks(info, |observe| trace.ticks.iter().for_each(observe));
-        ticks.write(|ticks| RunTrace { ticks, ..trace.clone() })
+    pub(super) fn of_trace<const N: usize>(
+        self,
+        info: &RunInfo,
+        trace: &RunTrace<N>,
+    ) -> Result<Written, CliError> {
+        let ((), ticks) = self.of_ticks(info, |observe| trace.ticks.iter().for_each(observe))?;
+        Ok(ticks.write(|ticks| RunTrace { ticks, ..trace.clone() }))
     }
 
     /// Returns the result of `run`, and its ticks, from which the files are to be written.
@@ -122,27 +184,32 @@ impl Outputs {
         self,
         info: &RunInfo,
         run: impl FnOnce(&mut Observer<'_, N>) -> T,
-    ) -> (T, Ticks<N>) {
+    ) -> Result<(T, Ticks<N>), CliError> {
+        let selection = self.of_trace.selection(info)?;
         let trace = self.trace.map(|output| {
-            let (name, failure) = (output.name().to_owned(), output.failure());
-            (name, failure, TraceWriter::new(output, info))
+            let named = match &output {
+                TraceOutput::File(file) => Some((file.name().to_owned(), file.failure())),
+                TraceOutput::Standard(_) => None,
+            };
+            (named, TraceWriter::new(output, info, selection))
         });
         let mut ticks = Ticks { trace, report: self.report, ticks: Vec::new() };
         let ran = run(&mut |tick| ticks.add(tick));
-        (ran, ticks)
+        Ok((ran, ticks))
     }
 }
 
 /// The ticks of a run. Only a report needs all of them at once.
 pub(super) struct Ticks<const N: usize> {
-    trace: Option<(String, Failure, TraceWriter<OutputFile>)>,
+    /// With its file's name, and what tells of a failure there.
+    trace: Option<(Option<(String, Failure)>, TraceWriter<TraceOutput>)>,
     report: Option<OutputFile>,
     ticks: Vec<TraceRow<N>>,
 }
 
 impl<const N: usize> Ticks<N> {
     fn add(&mut self, tick: &TraceRow<N>) {
-        if let Some((_, _, trace)) = &mut self.trace {
+        if let Some((_, trace)) = &mut self.trace {
             trace.add(tick);
         }
         if self.report.is_some() {
@@ -153,9 +220,15 @@ impl<const N: usize> Ticks<N> {
     /// Writes the trace, and the report of the ticks as converted by `trace`.
     pub(super) fn write(self, trace: impl FnOnce(Vec<TraceRow<N>>) -> RunTrace<N>) -> Written {
         let mut written = Written::default();
-        if let Some((name, failure, writer)) = self.trace {
-            let done = writer.finish().map_err(|source| failure.of(source));
-            written.add("trace", name, done.and_then(OutputFile::commit));
+        if let Some((named, writer)) = self.trace {
+            match (named, writer.finish()) {
+                (Some((name, failure)), done) => {
+                    let done = done.map_err(|source| failure.of(source));
+                    written.add("trace", name, done.and_then(TraceOutput::commit));
+                }
+                (None, Ok(mut out)) => written.printed = out.flush().err(),
+                (None, Err(source)) => written.printed = Some(source),
+            }
         }
         let ticks = self.ticks;
         written.write("report", self.report, |file| report::write_html(&trace(ticks), file));

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use super::error::{CliError, Outcome};
 use super::outputs::Written;
-use super::port::{PortArguments, greet};
+use super::port::PortArguments;
 use super::{input, write_json};
 use crate::board::job;
 use crate::board::parameters::{Difference, Figures, disable, read, write};
@@ -130,7 +130,7 @@ pub(super) fn identity(port: &PortArguments) -> Result<Identity, CliError> {
         return Err(CliError::Arguments { found, expected: "the port of a board (`motion board` is one)" });
     }
     let mut connection = port.open::<1>()?;
-    greet(&mut connection).map_err(|error| port.refused(error))?;
+    connection.greet().map_err(|error| port.refused(error))?;
     match connection.identity() {
         Some(identity) if (1..=9).contains(&identity.axes) => {
             let linked = BoardError::unless_linked(identity, identity.axes.into());
@@ -142,7 +142,7 @@ pub(super) fn identity(port: &PortArguments) -> Result<Identity, CliError> {
 
 fn connected<const M: usize>(port: &PortArguments) -> Result<Connection<M>, CliError> {
     let mut connection = port.open::<M>()?;
-    let greeted = greet(&mut connection);
+    let greeted = connection.greet();
     let linked = greeted.and_then(|()| match connection.identity() {
         Some(identity) => BoardError::unless_linked(identity, M),
         None => Err(BoardError::Silent),

@@ -16,7 +16,8 @@ use crate::trace::TracedBlock;
 
 const EXAMPLES: &str = "\
 Examples:
-  motion plan part.ngc                           a table: ceiling, its reason, feeds and time of every block
+  motion plan part.ngc                           the blocks that take longest: ceiling, its reason, feeds, time
+  motion plan part.ngc --all                     every block, in the order of the program
   motion plan part.ngc --machine mine.toml       for a machine of your own
   motion plan part.ngc --per-block               one pair of sin² ramps per block
   motion plan blocks.json --json                 lengths and feeds without geometry
@@ -42,10 +43,16 @@ pub struct PlanArguments {
     /// One pair of sin² ramps per block, whatever `law` is; without it, ramps follow it and may span blocks.
     #[arg(long)]
     per_block: bool,
-    /// Print JSON: time_s, blocks, feed.
+    /// List every block, in the order of the program, not only those that take longest.
+    #[arg(long)]
+    all: bool,
+    /// Print JSON: time_s, blocks, feed; of every block.
     #[arg(long)]
     json: bool,
 }
+
+/// So many blocks are listed, unless all are asked for.
+const LISTED: usize = 20;
 
 #[derive(Serialize)]
 struct PlanJson<'plan> {
@@ -114,7 +121,8 @@ fn show<const N: usize>(
     if arguments.json {
         write_json(&json(plan), out)?;
     } else {
-        write_plan(plan, out).map_err(CliError::Output)?;
+        let listed = if arguments.all { usize::MAX } else { LISTED };
+        write_plan(plan, listed, out).map_err(CliError::Output)?;
     }
     Ok(Outcome::Done)
 }
@@ -157,8 +165,12 @@ fn json<'plan, const N: usize>(plan: &'plan Plan<N>) -> PlanJson<'plan> {
     }
 }
 
-/// Writes the plan for people.
-pub(super) fn write_plan<const N: usize>(plan: &Plan<N>, out: &mut dyn Write) -> io::Result<()> {
+/// Writes the plan for people, with `listed` of its blocks at most: those that take longest, the longest first.
+pub(super) fn write_plan<const N: usize>(
+    plan: &Plan<N>,
+    listed: usize,
+    out: &mut dyn Write,
+) -> io::Result<()> {
     let columns = [
         ("block", "", Align::Right),
         ("line", "", Align::Right),
@@ -187,9 +199,20 @@ pub(super) fn write_plan<const N: usize>(plan: &Plan<N>, out: &mut dyn Write) ->
             format!("{:.6}", block.time_s),
         ]
     };
-    let rows: Vec<[String; 11]> = plan.blocks.iter().enumerate().map(row).collect();
-    table::write(&columns, &rows, out)?;
     let (blocks, parts) = (plan.blocks.len(), plan.feed.len());
+    let mut shown: Vec<(usize, &TracedBlock)> = plan.blocks.iter().enumerate().collect();
+    if blocks > listed {
+        shown.sort_by(|(_, one), (_, other)| other.time_s.total_cmp(&one.time_s));
+        shown.truncate(listed);
+        let time_s: f64 = shown.iter().map(|(_, block)| block.time_s).sum();
+        let share = 100.0 * time_s / plan.time_s;
+        writeln!(
+            out,
+            "  the {listed} blocks that take longest, {share:.1} % of the time; --all lists all {blocks}\n"
+        )?;
+    }
+    let rows: Vec<[String; 11]> = shown.into_iter().map(row).collect();
+    table::write(&columns, &rows, out)?;
     writeln!(
         out,
         "\n  {blocks} blocks, {:.4} mm, {parts} ramps and cruises, {:.6} s",

@@ -1,7 +1,6 @@
 //! A board at a port, for the commands that talk to one.
 
-use std::io;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use clap::Args;
 use motion_kernel::num::{Fixed, Root};
@@ -10,7 +9,7 @@ use super::error::{CliError, Outcome};
 use crate::board::sender::{Found, Permissions};
 use crate::board::simulator::{self, SimulatedBoard};
 use crate::board::wire::Wire;
-use crate::board::{BoardError, Connection, Heard, Port};
+use crate::board::{BoardError, Connection, Port};
 use crate::machine::Machine;
 use crate::planning::on_axis_count;
 
@@ -92,12 +91,12 @@ impl PortArguments {
     ) -> Result<Outcome, CliError> {
         if self.port == Port::Simulator {
             let (mut connection, _board) = self.simulated(machine)?;
-            greet(&mut connection).map_err(|error| self.refused(error))?;
+            connection.greet().map_err(|error| self.refused(error))?;
             return work.run::<f32, N>(connection);
         }
         on_axis_count!(machine.axis_count(), M => {
             let mut connection = self.open::<M>()?;
-            greet(&mut connection).map_err(|error| self.refused(error))?;
+            connection.greet().map_err(|error| self.refused(error))?;
             if connection.identity().is_some_and(|identity| identity.is_fixed_point) {
                 return work.run::<Fixed, M>(connection);
             }
@@ -117,25 +116,6 @@ impl PortArguments {
 pub(super) trait OnBoard {
     /// With a board of `M` axes, whose kernel is of the number type `R`.
     fn run<R: Root + Send, const M: usize>(self, connection: Connection<M>) -> Result<Outcome, CliError>;
-}
-
-/// Waits for the board's answer: what it is.
-pub(super) fn greet<const M: usize>(connection: &mut Connection<M>) -> Result<(), BoardError> {
-    let mut lost = None;
-    for _ in 0..200 {
-        connection.step(Duration::from_millis(50), &mut |heard| {
-            if let Heard::Lost(cause) = heard {
-                lost = Some(cause);
-            }
-        });
-        if connection.identity().is_some() {
-            return Ok(());
-        }
-        if let Some(cause) = lost.take() {
-            return Err(BoardError::Wire(io::Error::other(cause)));
-        }
-    }
-    Err(BoardError::Silent)
 }
 
 /// A number that no other start has: of the time.

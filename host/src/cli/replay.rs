@@ -10,6 +10,7 @@ use super::error::{CliError, Outcome};
 use super::input::{self, Source};
 use super::outputs::Outputs;
 use super::run::{self, RunJson};
+use super::trace::TraceArguments;
 use super::write_json;
 use crate::files::Files;
 use crate::gcode::AXES_MAX;
@@ -36,9 +37,8 @@ pub struct ReplayArguments {
     /// A file that `motion run --record` wrote (`-`: standard input).
     #[arg(value_name = "FILE")]
     recording: PathBuf,
-    /// Write every tick as a row of CSV; an existing file is replaced.
-    #[arg(long, value_name = "FILE.csv")]
-    trace: Option<PathBuf>,
+    #[command(flatten)]
+    trace: TraceArguments,
     /// Write a self-contained HTML page about the run; an existing file is replaced.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -53,7 +53,9 @@ pub struct ReplayArguments {
 /// The file is no recording, what it holds can't be executed, or a file can't be written.
 pub fn replay(arguments: &ReplayArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let mut files = Files::reading([("FILE", Some(arguments.recording.as_path()))]);
-    let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), arguments.report.as_ref())?;
+    let outputs = Outputs::open(&mut files, &arguments.trace, arguments.report.as_ref(), arguments.json)?;
+    let mut printed = outputs.printed(out);
+    let out = &mut *printed;
     let source = input::read(&arguments.recording)?;
     let refused = |error| CliError::Recording { path: source.name.clone(), source: error };
     match recording::places(&source.text).map_err(refused)? {

@@ -12,6 +12,7 @@ use super::input;
 use super::outputs::{self, Outputs, Written};
 use super::read::direction;
 use super::table::{self, Align};
+use super::trace::TraceArguments;
 use super::units::{InUnit, TableUnits};
 use super::write_json;
 use crate::files::{Files, OutputFile};
@@ -30,8 +31,10 @@ Examples:
   motion run part.ngc --report part.html             and write a page with plots of the run
   motion run part.ngc --machine mine.toml --trace part.csv
                                                      every tick of every axis, for a spreadsheet
-  motion run part.ngc --at 2000:hold,2600:resume,3000:override=0.5
-                                                     with commands before these ticks
+  motion run part.ngc --at N50:hold,1.3s:resume,3000:override=0.5
+                                                     with commands at a line, a time, and a tick
+  motion run part.ngc --trace - --columns t_s,X_err_um --every 10 | plot
+                                                     some columns of every tenth tick
   motion run part.ngc --record part.mrec             and record it for `motion replay`
   generate-part | motion run - --json                for a script
 
@@ -57,22 +60,24 @@ pub struct RunArguments {
     machine: Option<PathBuf>,
     #[command(flatten)]
     reading: input::ReadingArguments,
-    /// Write every tick as a row of CSV; an existing file is replaced.
-    #[arg(long, value_name = "FILE.csv")]
-    trace: Option<PathBuf>,
+    #[command(flatten)]
+    trace: TraceArguments,
     /// Write a self-contained HTML page about the run; an existing file is replaced.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
     /// Record the kernel's inputs, tick by tick, for `motion replay`; an existing file is replaced.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Live control: commands before given ticks, such as `2000:hold,2600:resume,3000:override=0.5`.
+    /// Live control: commands at given moments, such as `2000:hold,1.3s:resume,N50:override=0.5`.
+    ///
+    /// A moment is a tick (2000), a time from the start of the run (1.3s), or where motion on a program line begins (N50).
+    /// Each command waits for the one before it.
     ///
     /// A command is `hold` (come to rest on the path), `resume`, `abort` (come to rest and drop the rest of
     /// the program), `override=SHARE` (feed override: 0 to 2 times the program's feed, never above the
     /// machine's limits), `single` (single block: come to rest at the end of every program line and wait
     /// there for a resume) or `continuous` (single block off).
-    #[arg(long, value_name = "TICK:COMMAND,…")]
+    #[arg(long, value_name = "WHEN:COMMAND,…")]
     at: Option<Script>,
     /// Break the simulated machine before given ticks, such as `2000:encoder-lost=X`.
     ///
@@ -99,7 +104,9 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
         ("--parameters", arguments.reading.parameters.as_deref()),
         ("--tools", arguments.reading.tools.as_deref()),
     ]);
-    let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), arguments.report.as_ref())?;
+    let outputs = Outputs::open(&mut files, &arguments.trace, arguments.report.as_ref(), arguments.json)?;
+    let mut printed = outputs.printed(out);
+    let out = &mut *printed;
     let record = outputs::open(&mut files, "--record", arguments.record.as_ref())?;
     let kept = arguments.reading.parameters.as_ref();
     let kept = kept.map(|path| files.edited("--parameters", path, "--parameters")).transpose()?;

@@ -12,7 +12,7 @@ use clap::Args;
 use super::error::{CliError, Outcome};
 use super::outputs::{self, Written};
 use super::port::PortArguments;
-use super::trace::{AXIS_COLUMNS, TraceWriter};
+use super::trace::{AXIS_COLUMNS, Selection, TraceWriter};
 use crate::board::scope::{Scope, ScopeSummary, Ticks};
 use crate::board::{BoardError, Connection, parameters};
 use crate::files::{Failure, Files, OutputFile};
@@ -228,7 +228,7 @@ impl ScopeArguments {
         let record = parameters::read(connection).map_err(refused)?;
         let (name, failure) = (output.name().to_owned(), output.failure());
         let file = Arc::new(Mutex::new(ScopeFile {
-            trace: TraceWriter::new(output, info),
+            trace: TraceWriter::new(output, info, Selection::all(info)),
             names,
             trigger: self.trigger.clone(),
             before: self.before,
@@ -386,7 +386,7 @@ mod tests {
     fn a_trigger_writes_ticks_before_and_after() {
         let info = RunInfo::of_machine(&Machine::reference());
         let mut file = ScopeFile::<_, 3> {
-            trace: TraceWriter::new(Vec::new(), &info),
+            trace: TraceWriter::new(Vec::new(), &info, Selection::all(&info)),
             names: vec!["X".to_owned(), "Y".to_owned(), "Z".to_owned()],
             trigger: Some("X_err_um>50".parse().expect("a condition")),
             before: 2,

@@ -13,11 +13,11 @@ pub(super) enum Align {
 }
 
 /// A column: heading, unit (may be empty), alignment.
-pub(super) type Column = (&'static str, &'static str, Align);
+pub(super) type Column<'a> = (&'a str, &'a str, Align);
 
 /// Writes a table with one cell per column in every row.
 pub(super) fn write(
-    columns: &[Column],
+    columns: &[Column<'_>],
     rows: &[impl AsRef<[String]>],
     out: &mut dyn Write,
 ) -> io::Result<()> {

@@ -1,10 +1,17 @@
 //! The trace file: one row per tick, written during the run.
 
 use std::io::{self, Write};
+use std::num::NonZeroU64;
+use std::path::PathBuf;
+
+use clap::Args;
 
 use super::csv_failure;
+use super::error::CliError;
 use crate::axis_unit::AxisUnit;
+use crate::files::STANDARD_INPUT;
 use crate::simulate::RunInfo;
+use crate::simulate::live::{Reached, When};
 use crate::trace::{AxisTick, TraceRow};
 
 /// Columns of the path, then seven of each axis that there is.
@@ -49,12 +56,123 @@ const fn axis_column(
     AxisColumn { quantity, unit, decimals, of }
 }
 
+/// The trace that is asked for.
+#[derive(Clone, Debug, Default, Args)]
+pub(super) struct TraceArguments {
+    /// Write every tick as a row of CSV; an existing file is replaced. `-` is standard output, and nothing else is printed
+    /// there.
+    #[arg(long, value_name = "FILE.csv")]
+    pub(super) trace: Option<PathBuf>,
+    /// Columns of --trace in their order, by name, such as `t_s,X_err_um`. Without it, all.
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "trace")]
+    columns: Vec<String>,
+    /// The first tick of --trace: a tick (2000), a time (1.5s), or where a program line begins (N50).
+    #[arg(long, value_name = "WHEN", value_parser = when, requires = "trace")]
+    from: Option<When>,
+    /// The last tick of --trace, likewise.
+    #[arg(long, value_name = "WHEN", value_parser = when, requires = "trace")]
+    to: Option<When>,
+    /// Every how many ticks --trace has a row.
+    #[arg(long, value_name = "TICKS", requires = "trace")]
+    every: Option<NonZeroU64>,
+}
+
+fn when(text: &str) -> Result<When, String> {
+    text.parse().map_err(|()| {
+        format!("found `{text}`, expected a tick such as 2000, a time such as 1.5s, or a line such as N50")
+    })
+}
+
+impl TraceArguments {
+    /// Whether the trace goes to standard output.
+    pub(super) fn is_standard(&self) -> bool {
+        self.trace.as_deref().is_some_and(|path| path.as_os_str() == STANDARD_INPUT)
+    }
+
+    /// What is to be written of a run of `info`.
+    ///
+    /// # Errors
+    /// There is no such column.
+    pub(super) fn selection(&self, info: &RunInfo) -> Result<Selection, CliError> {
+        let names = names(info);
+        let place = |name: &String| {
+            let place = names.iter().position(|known| known == name.trim());
+            place.ok_or_else(|| CliError::Column { found: name.clone(), expected: names.join(", ") })
+        };
+        let columns = if self.columns.is_empty() {
+            (0..names.len()).collect()
+        } else {
+            self.columns.iter().map(place).collect::<Result<_, _>>()?
+        };
+        let ticks = Ticks {
+            from: self.from,
+            to: self.to,
+            every: self.every.map_or(1, NonZeroU64::get),
+            ..Ticks::ALL
+        };
+        Ok(Selection { columns, ticks })
+    }
+}
+
+/// The columns of a trace, and its ticks.
+#[derive(Clone, Debug)]
+pub(super) struct Selection {
+    columns: Vec<usize>,
+    ticks: Ticks,
+}
+
+impl Selection {
+    /// Everything.
+    pub(super) fn all(info: &RunInfo) -> Self {
+        Self { columns: (0..names(info).len()).collect(), ticks: Ticks::ALL }
+    }
+}
+
+/// Which ticks are written.
+#[derive(Clone, Copy, Debug)]
+struct Ticks {
+    from: Option<When>,
+    to: Option<When>,
+    every: u64,
+    /// The first one that was; whether the last one was.
+    first: Option<u64>,
+    is_over: bool,
+    /// The program line of the tick before.
+    line: u32,
+}
+
+impl Ticks {
+    const ALL: Self = Self { from: None, to: None, every: 1, first: None, is_over: false, line: 0 };
+
+    /// Whether a tick is written.
+    fn takes(&mut self, tick: u64, line: u32, tick_s: f64) -> bool {
+        let reached = Reached { tick, lines: [line, self.line] };
+        self.line = line;
+        let is_reached = |when: Option<When>| when.is_some_and(|when| when.is_reached(reached, tick_s));
+        if self.first.is_none() && (self.from.is_none() || is_reached(self.from)) {
+            self.first = Some(tick);
+        }
+        let Some(first) = self.first.filter(|_| !self.is_over) else { return false };
+        self.is_over = is_reached(self.to);
+        (tick - first).is_multiple_of(self.every)
+    }
+}
+
+/// The names of all columns.
+fn names(info: &RunInfo) -> Vec<String> {
+    let of_axes = info.axes.iter().flat_map(|axis| {
+        AXIS_COLUMNS.map(|AxisColumn { quantity, unit, .. }| {
+            format!("{}_{quantity}_{}", axis.name, unit(axis.unit()))
+        })
+    });
+    PATH_COLUMNS.map(str::to_owned).into_iter().chain(of_axes).collect()
+}
+
 /// A trace being written.
 pub(super) struct TraceWriter<W: Write> {
     csv: csv::Writer<W>,
     tick_s: f64,
-    /// The axes that there are.
-    axis_count: usize,
+    selection: Selection,
     /// The text of one field, kept to reuse its memory.
     field: Vec<u8>,
     /// The first failure; nothing is written after it.
@@ -63,17 +181,16 @@ pub(super) struct TraceWriter<W: Write> {
 
 impl<W: Write> TraceWriter<W> {
     /// Writes the header. A failure is kept for [`Self::finish`]: it does not stop the run.
-    pub(super) fn new(out: W, info: &RunInfo) -> Self {
+    pub(super) fn new(out: W, info: &RunInfo, selection: Selection) -> Self {
         let csv = csv::Writer::from_writer(out);
-        let (tick_s, axis_count) = (info.tick_s, info.axes.len());
-        let mut writer = Self { csv, tick_s, axis_count, field: Vec::new(), failure: None };
+        let mut writer = Self { csv, tick_s: info.tick_s, selection, field: Vec::new(), failure: None };
         writer.failure = writer.header(info).err();
         writer
     }
 
     /// Adds a row, or keeps its failure.
     pub(super) fn add<const N: usize>(&mut self, tick: &TraceRow<N>) {
-        if self.failure.is_none() {
+        if self.failure.is_none() && self.selection.ticks.takes(tick.tick, tick.line, self.tick_s) {
             self.failure = self.row(tick).err();
         }
     }
@@ -87,33 +204,36 @@ impl<W: Write> TraceWriter<W> {
     }
 
     fn header(&mut self, info: &RunInfo) -> io::Result<()> {
-        for column in PATH_COLUMNS {
-            self.csv.write_field(column).map_err(csv_failure)?;
-        }
-        for axis in &info.axes {
-            for AxisColumn { quantity, unit, .. } in AXIS_COLUMNS {
-                let name = format!("{}_{quantity}_{}", axis.name, unit(axis.unit()));
-                self.csv.write_field(name).map_err(csv_failure)?;
-            }
+        let names = names(info);
+        for name in self.selection.columns.iter().filter_map(|&column| names.get(column)) {
+            self.csv.write_field(name).map_err(csv_failure)?;
         }
         self.csv.write_record(None::<&[u8]>).map_err(csv_failure)
     }
 
     fn row<const N: usize>(&mut self, tick: &TraceRow<N>) -> io::Result<()> {
-        self.text(format_args!("{}", tick.tick))?;
-        self.number(tick.tick as f64 * self.tick_s, TIME)?;
-        self.number(tick.s_mm, POSITION)?;
-        self.number(tick.v_mm_s, VELOCITY)?;
-        self.number(tick.a_mm_s2, CHANGE)?;
-        self.number(tick.j_mm_s3, CHANGE)?;
-        self.text(format_args!("{}", tick.state))?;
-        self.text(format_args!("{}", tick.line))?;
-        for axis in tick.axes.iter().take(self.axis_count) {
-            for column in &AXIS_COLUMNS {
-                self.number((column.of)(axis), column.decimals)?;
-            }
+        for index in 0..self.selection.columns.len() {
+            self.column(self.selection.columns[index], tick)?;
         }
         self.csv.write_record(None::<&[u8]>).map_err(csv_failure)
+    }
+
+    fn column<const N: usize>(&mut self, column: usize, tick: &TraceRow<N>) -> io::Result<()> {
+        match column {
+            0 => self.text(format_args!("{}", tick.tick)),
+            1 => self.number(tick.tick as f64 * self.tick_s, TIME),
+            2 => self.number(tick.s_mm, POSITION),
+            3 => self.number(tick.v_mm_s, VELOCITY),
+            4 => self.number(tick.a_mm_s2, CHANGE),
+            5 => self.number(tick.j_mm_s3, CHANGE),
+            6 => self.text(format_args!("{}", tick.state)),
+            7 => self.text(format_args!("{}", tick.line)),
+            of_axis => {
+                let of_axes = of_axis - PATH_COLUMNS.len();
+                let column = &AXIS_COLUMNS[of_axes % AXIS_COLUMNS.len()];
+                self.number((column.of)(&tick.axes[of_axes / AXIS_COLUMNS.len()]), column.decimals)
+            }
+        }
     }
 
     fn number(&mut self, value: f64, decimals: usize) -> io::Result<()> {
@@ -142,7 +262,7 @@ mod tests {
             (axis.name, axis.letter) = (letter.to_string(), letter);
         }
         let mut text = Vec::new();
-        let mut trace = TraceWriter::new(&mut text, &info);
+        let mut trace = TraceWriter::new(&mut text, &info, Selection::all(&info));
         trace.add(&TraceRow {
             tick: 0,
             s_mm: 0.0,
@@ -168,7 +288,8 @@ mod tests {
     #[test]
     fn header_and_row() {
         let mut text = Vec::new();
-        let mut trace = TraceWriter::new(&mut text, &RunInfo::of_machine(&Machine::reference()));
+        let info = RunInfo::of_machine(&Machine::reference());
+        let mut trace = TraceWriter::new(&mut text, &info, Selection::all(&info));
         let axis = AxisTick { set_mm: 7_999.999_999_999_8, act_mm: -0.1, ..AxisTick::default() };
         trace.add(&TraceRow {
             tick: 3,

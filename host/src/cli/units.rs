@@ -32,6 +32,21 @@ impl<T: Serialize> Serialize for InUnit<T> {
     }
 }
 
+/// A feed of the command line, per second: a number is per minute, as in programs, unless it carries its unit.
+pub(super) fn feed_per_s(text: &str) -> Result<f64, String> {
+    let per_s = [("mm/s", 1.0), ("deg/s", 1.0), ("°/s", 1.0)];
+    let per_min = [("mm/min", 60.0), ("deg/min", 60.0), ("°/min", 60.0), ("", 60.0)];
+    let of_unit = |&(unit, seconds): &(&str, f64)| {
+        let number: f64 = text.trim().strip_suffix(unit)?.trim().parse().ok()?;
+        Some(number / seconds)
+    };
+    per_s
+        .iter()
+        .chain(&per_min)
+        .find_map(of_unit)
+        .ok_or_else(|| format!("found `{text}`, expected a feed such as 3000 (mm/min), 50mm/s or 10deg/s"))
+}
+
 /// Where the units of a table of axes stand: in its head, or beside each figure if there are rotary axes.
 #[derive(Clone, Copy)]
 pub(super) struct TableUnits {
@@ -57,6 +72,19 @@ impl TableUnits {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_feed_is_per_minute_or_carries_its_unit() {
+        for (text, expected) in
+            [("3000", 50.0), ("50mm/s", 50.0), ("3000 mm/min", 50.0), ("10deg/s", 10.0), ("600°/min", 10.0)]
+        {
+            assert_eq!(feed_per_s(text), Ok(expected), "{text}");
+        }
+        for text in ["", "mm/s", "fast", "50m/s", "50mm"] {
+            let error = feed_per_s(text).expect_err(text);
+            assert!(error.starts_with(&format!("found `{text}`, expected a feed")), "{error}");
+        }
+    }
 
     #[test]
     fn keys_of_a_rotary_axis_say_degrees() {

@@ -9,7 +9,7 @@ use motion_kernel::units::Position;
 
 use super::error::{CliError, Outcome};
 use super::parameters::identity;
-use super::port::{PortArguments, greet};
+use super::port::PortArguments;
 use super::scope::ScopeArguments;
 use super::send::state_words;
 use crate::board::{BoardError, Connection, Heard, Scope};
@@ -70,7 +70,7 @@ fn show<const M: usize>(
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
     let mut connection: Connection<M> = arguments.port.open()?;
-    greet(&mut connection).map_err(|error| arguments.port.refused(error))?;
+    connection.greet().map_err(|error| arguments.port.refused(error))?;
     let scoped = arguments.scope.start(&[], &info(M, tick_s), &arguments.port, &mut connection)?;
     if scoped.is_some() {
         // Its file is finished first.

@@ -38,7 +38,7 @@ pub enum TicksError {
     #[error(transparent)]
     Planning(#[from] PlanningError),
     /// The kernel refused what the planner made.
-    #[error("the kernel rejects the plan: {0}")]
+    #[error("found motion that can't be executed: {0}")]
     Rejected(SupplyError<Infallible>),
     /// The executor stopped with a fault.
     #[error("the executor stops: {0}")]

@@ -49,6 +49,10 @@ impl GcodeError {
 #[non_exhaustive]
 #[allow(missing_docs, reason = "the messages say what the variants and their fields are")]
 pub enum Problem {
+    #[error("found an empty file, expected G-code")]
+    EmptyText,
+    #[error("found UTF-16 text, expected UTF-8 or ASCII: save the program in one of these")]
+    WideText,
     #[error("found {found}, expected a word such as X1.5, a comment or the end of the line")]
     Character { found: String },
     #[error("found '%' among other text, expected it alone in its line")]

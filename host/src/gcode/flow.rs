@@ -55,6 +55,22 @@ pub(super) struct Flow<'a> {
     pub(super) executed: u64,
     /// The last line with text in the program's own file.
     last: u32,
+    /// Why the text as a whole is no program: nothing of it is read.
+    unread: Option<Problem>,
+}
+
+/// Why a text can't be a program, whatever its lines are.
+fn unread(text: &[u8]) -> Option<Problem> {
+    let is_wide = match text {
+        [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] => true,
+        // Without the mark: every character of G-code has a zero byte then.
+        [0, other, ..] | [other, 0, ..] => *other != 0,
+        _ => false,
+    };
+    if is_wide {
+        return Some(Problem::WideText);
+    }
+    text.iter().all(u8::is_ascii_whitespace).then_some(Problem::EmptyText)
 }
 
 impl<'a> Flow<'a> {
@@ -70,6 +86,7 @@ impl<'a> Flow<'a> {
             repeats: Vec::new(),
             executed: 0,
             last: 1,
+            unread: unread(text),
         }
     }
 
@@ -83,6 +100,9 @@ impl<'a> Flow<'a> {
     pub(super) fn next_line(&mut self) -> Result<bool, Failure<'a>> {
         let Some(file) = self.library.file(self.file).map(Rc::clone) else { return Ok(false) };
         let here = self.place;
+        if let Some(problem) = &self.unread {
+            return Err(file.failure(here, Located::new(0, problem.clone())));
+        }
         let Some((line, after)) = file.source.line(here) else {
             if self.calls.is_empty() {
                 return Ok(false);

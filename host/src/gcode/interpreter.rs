@@ -496,7 +496,7 @@ mod tests {
         assert_eq!(steps("G0 X1\n%"), steps("%\nX1 G0 M30\n%"));
         let program = read("a", b"M2\n\n%\nG99 [\n(x)").unwrap();
         assert_eq!(program.notices, [Notice { kind: NoticeKind::TextAfterEnd, first_line: 4, count: 2 }]);
-        let program = read("a", b"").unwrap();
+        let program = read("a", b"()").unwrap();
         assert_eq!(program.notices, [Notice { kind: NoticeKind::NoProgramEnd, first_line: 1, count: 1 }]);
     }
 

@@ -183,9 +183,28 @@ mod tests {
             .collect()
     }
 
+    /// What is no program at all is said once.
+    #[test]
+    fn a_text_that_is_no_program_is_named() {
+        let said = |text: &[u8]| -> Vec<String> {
+            let refusals = refusals("a.ngc", text, &ReadOptions::default());
+            refusals.iter().map(|refusal| refusal.first.to_string()).collect()
+        };
+        let empty = ["a.ngc:1:1: found an empty file, expected G-code"];
+        let wide =
+            ["a.ngc:1:1: found UTF-16 text, expected UTF-8 or ASCII: save the program in one of these"];
+        assert_eq!(said(b""), empty);
+        assert_eq!(said(b" \r\n\n"), empty);
+        for text in [&b"\xFF\xFEG\0001\0\n\0"[..], b"\xFE\xFF\0G\0001", b"G\0001\0", b"\0G\0001"] {
+            assert_eq!(said(text), wide, "{text:?}");
+        }
+        // Bytes that are neither are told one by one.
+        assert_ne!(said(b"\0\0G1"), wide);
+    }
+
     #[test]
     fn accepted_programs_have_none() {
-        for text in ["G1 X1 F60\nM2\n", "", "o1 sub\nG1 X1 F9\no1 endsub\n"] {
+        for text in ["G1 X1 F60\nM2\n", "()", "o1 sub\nG1 X1 F9\no1 endsub\n"] {
             assert_eq!(found(text), []);
         }
     }

@@ -209,6 +209,12 @@ fn unmade(error: &SegmentError, tick_s: f64) -> String {
         // The kernel's quantities carry their units: "t1 [s]".
         SegmentError::OutOfRange { quantity, value } => {
             let (name, unit) = quantity.trim_end_matches(']').split_once(" [").unwrap_or((quantity, ""));
+            let name = match name {
+                "t1" => "the time of a pulse of jerk",
+                // Of a ramp's hold, or of a cruise.
+                "t2 − t1" => "the time without jerk",
+                name => name,
+            };
             let expected = match unit {
                 // The one length that depends on the number type, and that f32 alone can refuse here.
                 "mm" if name.starts_with("jerk") => format!(

@@ -106,7 +106,10 @@ impl<const N: usize> Gathered<N> {
 
     /// The plan, if the tick can do it: what it can't is to be refused here, not on the machine.
     fn checked(self, machine: &Machine<N>) -> Result<Plan<N>, PlanningError> {
-        let Self { plan, .. } = self;
+        let Self { mut plan, .. } = self;
+        if plan.stretches == 0 {
+            plan.notices.push("nothing moves: the program has no motion".to_owned());
+        }
         for item in &Executable::new::<f32>(&plan)?.items {
             travel::check(item, machine).map_err(|problem| PlanningError::at_line(&plan.source, problem))?;
         }

@@ -12,7 +12,7 @@ use motion_kernel::program::{Item, Supply, SupplyError, Switching};
 use motion_kernel::queue::{Feeder, Intake, LiveFeeder, LiveStreams, PathRules, Streams};
 use motion_kernel::units::Position;
 
-use super::live::{Command, Script};
+use super::live::{Command, Reached, Script};
 use super::switches::Switches;
 use crate::trace::{HeldBy, RunEnd};
 
@@ -44,6 +44,7 @@ pub(super) struct Live<'a, R: Real, I, const N: usize> {
     feeder: LiveFeeder<'a, R, N>,
     control: LiveControl<R, N, Switching<I>, Infallible, PLACES>,
     script: &'a Script,
+    tick_s: f64,
     /// Commands given so far.
     given: usize,
     /// Whether the latest of hold and resume was a hold.
@@ -78,7 +79,7 @@ impl<'script, R: Real, const N: usize> Storage<'script, R, N> {
                 let (mut feeder, intake) = streams.split(rules, start);
                 feeder.bound(travel);
                 let control = LiveControl::new(items, pulse, tick_s, Leads::NONE);
-                let live = Live { feeder, control, script, given: 0, is_on_hold: false };
+                let live = Live { feeder, control, script, tick_s, given: 0, is_on_hold: false };
                 (Background::Live(Box::new(live)), intake)
             }
         }
@@ -89,10 +90,11 @@ impl<R: Real, I: Iterator<Item = Result<Item<N>, Infallible>>, const N: usize> B
     /// Before a tick; the one before ended in `state`.
     pub(super) fn poll(
         &mut self,
-        tick: u64,
+        reached: Reached,
         state: ExecState,
         (switches, hardware): (&mut Switches<'_>, &mut impl Outputs),
     ) -> Result<(), SupplyError<Infallible>> {
+        let tick = reached.tick;
         match self {
             Self::Plain(plain) => {
                 let (feeder, supply) = &mut **plain;
@@ -107,9 +109,9 @@ impl<R: Real, I: Iterator<Item = Result<Item<N>, Infallible>>, const N: usize> B
                 supply.fill(feeder)
             }
             Self::Live(live) => {
-                let Live { feeder, control, script, given, is_on_hold } = &mut **live;
+                let Live { feeder, control, script, tick_s, given, is_on_hold } = &mut **live;
                 while let Some(timed) = script.commands().get(*given)
-                    && timed.tick <= tick
+                    && timed.when.is_reached(reached, *tick_s)
                 {
                     match timed.command {
                         Command::Hold => *is_on_hold = true,

@@ -3,7 +3,7 @@
 //! Consumes a script and the executed ticks; produces a [`TracedCommand`] for each command that was given,
 //! with the rest that it led to.
 
-use super::live::{Command, Script, Timed};
+use super::live::{Command, Reached, Script, Timed};
 use crate::trace::{TraceRow, TracedCommand, TracedStop};
 
 /// Follows the ticks.
@@ -25,12 +25,13 @@ impl<'run> Commands<'run> {
         Self { ahead: script.map_or(&[], Script::commands), tick_s, ..Self::default() }
     }
 
-    pub(super) fn add<const N: usize>(&mut self, tick: &TraceRow<N>) {
+    /// Takes a tick; the run had reached `reached` before it.
+    pub(super) fn add<const N: usize>(&mut self, reached: Reached, tick: &TraceRow<N>) {
         while let [next, ahead @ ..] = self.ahead
-            && next.tick <= tick.tick
+            && next.when.is_reached(reached, self.tick_s)
         {
             self.ahead = ahead;
-            self.give(next);
+            self.give(tick.tick, next.command);
         }
         self.latest = (tick.v_mm_s, tick.s_mm);
         if tick.v_mm_s > 0.0 {
@@ -40,7 +41,7 @@ impl<'run> Commands<'run> {
         }
     }
 
-    fn give(&mut self, &Timed { tick, command }: &Timed) {
+    fn give(&mut self, tick: u64, command: Command) {
         self.settle(|waiting| is_ended_by(waiting, command));
         if asks_for_rest(command) {
             self.waiting.push((self.records.len(), command));
@@ -117,18 +118,22 @@ mod tests {
         let mut s_mm = 0.0;
         for (tick, &v_mm_s) in feeds_mm_s.iter().enumerate() {
             s_mm += 0.01 * v_mm_s;
-            commands.add(&TraceRow {
-                tick: tick as u64,
-                s_mm,
-                v_mm_s,
-                a_mm_s2: 0.0,
-                j_mm_s3: 0.0,
-                snap_mm_s4: 0.0,
-                state: "moving",
-                line: 0,
-                contour_um: 0.0,
-                axes: [AxisTick::default(); 3],
-            });
+            let reached = Reached { tick: tick as u64, lines: [0; 2] };
+            commands.add(
+                reached,
+                &TraceRow {
+                    tick: tick as u64,
+                    s_mm,
+                    v_mm_s,
+                    a_mm_s2: 0.0,
+                    j_mm_s3: 0.0,
+                    snap_mm_s4: 0.0,
+                    state: "moving",
+                    line: 0,
+                    contour_um: 0.0,
+                    axes: [AxisTick::default(); 3],
+                },
+            );
         }
         commands.finish().0
     }

@@ -28,6 +28,6 @@ pub enum RunError {
     #[error("correction: {0}")]
     Correction(#[from] CorrectionError),
     /// The kernel refused what the planner made.
-    #[error("the kernel rejects the plan: {0}")]
+    #[error("found motion that can't be executed: {0}")]
     Rejected(SupplyError<Infallible>),
 }

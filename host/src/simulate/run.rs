@@ -20,6 +20,7 @@ use super::hardware::{Hardware, SimulatedHardware, simulated};
 use super::inject::Injections;
 use super::job::{Job, Number, RunOptions, StretchCorrection};
 use super::limit_share::LimitShare;
+use super::live::Reached;
 use super::probing::{Probed, Probing};
 use super::summary::{AxisSummary, Collector, RunSummary};
 use super::switches::Switches;
@@ -131,8 +132,10 @@ fn run_in<R: Real, const N: usize>(
     let mut state = ExecState::Idle;
     let mut goes_on = true;
     summary.end = RunEnd::Cut;
+    let mut lines = [0; 2];
     while goes_on {
-        background.poll(collector.ticks(), state, (&mut switches, hardware)).map_err(RunError::Rejected)?;
+        let reached = Reached { tick: collector.ticks(), lines };
+        background.poll(reached, state, (&mut switches, hardware)).map_err(RunError::Rejected)?;
         let was_idle = state == ExecState::Idle;
         let trace = *kernel.tick_corrected(&mut intake, hardware);
         goes_on = hardware.advance(&trace);
@@ -148,7 +151,8 @@ fn run_in<R: Real, const N: usize>(
         collector.add(&row);
         limit_share.add(&row);
         probing.tick(&trace);
-        commands.add(&row);
+        commands.add(reached, &row);
+        lines = [row.line, lines[0]];
         observe(&row);
         if let Some(fault) = trace.fault {
             summary.end = RunEnd::Faulted;

@@ -51,7 +51,7 @@ fn jog_goes_as_far_as_its_key_says() {
     let bounded = bounded.replace("#low_mm = -400", "low_mm = -40").replace("#high_mm = 400", "high_mm = 30");
     workspace.put("machine.toml", &bounded);
     let keys = ["X+20", "Y-2.5", "X+", "X-@400", "X+1@5000"];
-    let rest = ["--machine", "machine.toml", "--feed", "50", "--trace", "jog.csv", "--json"];
+    let rest = ["--machine", "machine.toml", "--feed", "3000", "--trace", "jog.csv", "--json"];
     let presses = workspace.json(&[&["jog"][..], &keys, &rest].concat());
     let presses = presses.as_array().expect("a list");
     let ended: Vec<_> = presses.iter().map(|press| press["ended"].as_str().expect("a text")).collect();
@@ -80,7 +80,7 @@ fn jog_goes_as_far_as_its_key_says() {
     let half_edge_s = PI * 5000.0 / (4.0 * 400_000.0);
     released_in_the_ramp(fourth, half_edge_s + half_edge_s.hypot((50.0 / 5000.0_f64).sqrt()));
     workspace.put("sin2.toml", &bounded.replace("law = \"plateau\"", "law = \"sin2\""));
-    let arch = workspace.json(&["jog", "X-@400", "--machine", "sin2.toml", "--feed", "50", "--json"]);
+    let arch = workspace.json(&["jog", "X-@400", "--machine", "sin2.toml", "--feed", "3000", "--json"]);
     released_in_the_ramp(&arch[0], (2.0 * 50.0 / 5000.0_f64).sqrt());
     // Where the key is released behind the end, the end is the distance's.
     let gone_mm = number(&fifth["to_mm"]) - number(&fifth["from_mm"]);
@@ -101,7 +101,10 @@ fn jog_goes_as_far_as_its_key_says() {
             "X+: found no [axis.travel] for its axis, expected one to go on to, or a distance",
         ),
         (&["jog", "X+1", "Q+1"], "Q+1: found no such axis, expected one of X, Y, Z"),
-        (&["jog", "X+1", "--feed", "301"], "X+1: found a feed of 301 mm/s, expected above 0, at most 300"),
+        (
+            &["jog", "X+1", "--feed", "301mm/s"],
+            "X+1: found a feed of 301 mm/s, expected above 0, at most 300",
+        ),
         (&["jog", "X+1", "--feed", "nan"], "X+1: found a feed of NaN mm/s, expected above 0, at most 300"),
     ] {
         assert_eq!(workspace.refusal(arguments), expected);

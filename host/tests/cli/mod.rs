@@ -5,6 +5,7 @@ mod checking;
 mod drive;
 mod files;
 mod machines;
+mod options;
 mod planning;
 mod reading;
 mod probing;

@@ -133,7 +133,7 @@ fn subroutines_lie_in_files_of_their_own() {
     let refusal = workspace.refusal(&["read", "part.ngc", "--subroutines", "mroe"]);
     assert!(
         refusal.starts_with("mroe: found ")
-            && refusal.trim_end().ends_with("expected a folder that can be read"),
+            && refusal.trim_end().ends_with("expected a folder that can be used"),
         "{refusal}"
     );
     workspace.put("pocket.ngc", "G0 X1\n");

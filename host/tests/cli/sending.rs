@@ -275,7 +275,7 @@ fn a_program_is_gone_on_with_after_power_cuts() {
 fn keys_jog_on_a_board() {
     let workspace = Workspace::new("jog_board");
     let board = Board::start(&workspace);
-    let jog = ["jog", "X+2", "Y-1", "--port", &board.1, "--feed", "20", "--json", "--dead-man"];
+    let jog = ["jog", "X+2", "Y-1", "--port", &board.1, "--feed", "20mm/s", "--json", "--dead-man"];
     let (status, _, error) = outcome(workspace.command(&jog).arg("30"));
     assert!(status == Some(2) && error.contains("found the drives off, expected --enable"), "{error}");
     let (status, _, error) = outcome(workspace.command(&jog).args(["0.01", "--enable"]));

@@ -16,7 +16,7 @@ use crate::smoothness::{self, AxisTicks, Course, Evaluator, FEED_MM_S, Figures, 
 
 pub(super) fn run(arguments: &SplineArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let mut files = Files::reading([]);
-    let trace = outputs::open(&mut files, "--trace", arguments.trace.as_ref())?;
+    let trace = outputs::open(&mut files, "--trace", arguments.trace.trace.as_ref())?;
     let report = outputs::open(&mut files, "--report", arguments.report.as_ref())?;
     let courses = smoothness::courses()
         .map_err(|source| CliError::Spline { place: "the built-in points".to_owned(), source })?;

@@ -13,6 +13,7 @@ use super::error::{CliError, Outcome};
 use super::input;
 use super::outputs::Outputs;
 use super::run::{self, RunJson};
+use super::trace::TraceArguments;
 use super::write_json;
 use crate::files::Files;
 use crate::planning::plan_spline;
@@ -73,9 +74,8 @@ pub struct SplineArguments {
     /// Machine file (`motion machine` prints one); without it, the reference machine.
     #[arg(long, value_name = "FILE", requires = "points")]
     machine: Option<PathBuf>,
-    /// Write every tick as a row of CSV; an existing file is replaced.
-    #[arg(long, value_name = "FILE.csv")]
-    trace: Option<PathBuf>,
+    #[command(flatten)]
+    trace: TraceArguments,
     /// Write a self-contained HTML page; an existing file is replaced.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
@@ -124,7 +124,9 @@ fn run_points(path: &Path, arguments: &SplineArguments, out: &mut dyn Write) -> 
         });
     }
     let mut files = Files::reading([("POINTS.csv", Some(path)), ("--machine", arguments.machine.as_deref())]);
-    let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), arguments.report.as_ref())?;
+    let outputs = Outputs::open(&mut files, &arguments.trace, arguments.report.as_ref(), arguments.json)?;
+    let mut printed = outputs.printed(out);
+    let out = &mut *printed;
     let machine = input::xyz_machine(arguments.machine.as_ref())?;
     let source = input::read(path)?;
     let points = points::read(&source.name, &source.text)?;

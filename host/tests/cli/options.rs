@@ -1,0 +1,159 @@
+//! What is asked for and how it is shown: moments of commands and traces, columns, units, lists by purpose.
+
+use super::workspace::{STRINGER, Workspace, number};
+
+/// Two lines of 30 mm, as lines 2 and 3.
+const CORNER: &str = "G21 G90 G61 F3000\nG1 X30\nG1 Y30\nM2\n";
+
+/// What is said of a wrong argument.
+fn wrong(workspace: &Workspace, arguments: &[&str]) -> String {
+    let output = workspace.motion(arguments);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+    String::from_utf8(output.stderr).expect("UTF-8")
+}
+
+/// A moment is a tick, a time, or a program line.
+#[test]
+fn commands_are_given_at_ticks_times_and_lines() {
+    let workspace = Workspace::new("moments");
+    workspace.put("part.ngc", CORNER);
+    let run = |at: &str| workspace.json(&["run", "part.ngc", "--json", "--at", at]);
+    let by_tick = run("600:hold,1600:resume");
+    let by_time = run("0.3s:hold,0.8s:resume");
+    assert_eq!(by_tick["ticks"], by_time["ticks"]);
+    assert_eq!(by_tick["commands"][0]["s_mm"], by_time["commands"][0]["s_mm"]);
+    assert_eq!(number(&by_time["commands"][0]["tick"]) as u64, 600);
+    // In the first ticks of the second line, whenever that is.
+    let (held, _) = workspace.ending(3, &["run", "part.ngc", "--json", "--at", "0.1s:override=0.5,N3:hold"]);
+    let held: serde_json::Value = serde_json::from_str(&held).expect("JSON");
+    let at_mm = number(&held["commands"][1]["s_mm"]);
+    assert!((30.0..30.1).contains(&at_mm), "{at_mm}");
+    assert_eq!(held["reached_line"].as_u64(), Some(3));
+    // A line without motion is never reached, and named as it was given.
+    let output = workspace.motion(&["run", "part.ngc", "--json", "--at", "N9:hold"]);
+    assert_eq!(output.status.code(), Some(5));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("N9:hold"));
+    let refusal = wrong(&workspace, &["run", "part.ngc", "--at", "soon:hold"]);
+    assert!(refusal.contains("found `soon:hold`, expected WHEN:COMMAND"), "{refusal}");
+}
+
+/// Columns and rows of a trace are chosen, and it may go to standard output.
+#[test]
+fn a_trace_has_the_columns_and_rows_that_are_asked_for() {
+    let workspace = Workspace::new("columns");
+    workspace.put("part.ngc", CORNER);
+    let all = {
+        workspace.stdout(&["run", "part.ngc", "--trace", "all.csv"]);
+        workspace.read("all.csv")
+    };
+    let some = workspace.stdout(&[
+        "run",
+        "part.ngc",
+        "--trace",
+        "-",
+        "--columns",
+        "line,tick,Y_set_mm",
+        "--from",
+        "N3",
+        "--to",
+        "0.9s",
+        "--every",
+        "100",
+    ]);
+    let mut lines = some.lines();
+    assert_eq!(lines.next(), Some("line,tick,Y_set_mm"));
+    let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    let first: u64 = rows[0][1].parse().expect("a tick");
+    let ticks: Vec<u64> = rows.iter().map(|row| row[1].parse().expect("a tick")).collect();
+    assert_eq!(ticks, (first..=1800).step_by(100).collect::<Vec<_>>());
+    // The same figures as in the whole trace.
+    let header: Vec<&str> = all.lines().next().expect("a header").split(',').collect();
+    let column = header.iter().position(|&name| name == "Y_set_mm").expect("a column");
+    for row in &rows {
+        let whole = all.lines().nth(row[1].parse::<usize>().expect("a tick") + 1).expect("a row");
+        assert_eq!(whole.split(',').nth(column), Some(row[2]));
+        assert_eq!(row[0], "3");
+    }
+    let refusal = workspace.refusal(&["run", "part.ngc", "--trace", "-", "--columns", "X_set"]);
+    assert!(refusal.contains("found the column X_set, expected one of tick, t_s,"), "{refusal}");
+    let refusal = workspace.refusal(&["run", "part.ngc", "--trace", "-", "--json"]);
+    assert!(refusal.contains("found --trace - with --json"), "{refusal}");
+    assert!(!workspace.0.join("-").exists());
+}
+
+/// No line of a comparison is longer than a screen, whatever the paths of programs.
+#[test]
+fn a_comparison_fits_the_screen() {
+    let workspace = Workspace::new("narrow");
+    let name = format!("{}.ngc", "a_program_with_a_long_name".repeat(3));
+    workspace.put(&name, STRINGER);
+    let tolerances = ["0.001", "0.002", "0.003", "0.005", "0.01", "0.02"];
+    let tolerances = tolerances.iter().flat_map(|tolerance| ["--tolerance", tolerance]);
+    let arguments: Vec<&str> = ["compare", name.as_str()].into_iter().chain(tolerances).collect();
+    let text = workspace.stdout(&arguments);
+    assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+    assert!(text.contains("G64 P0.02") && text.contains("least [s]"), "{text}");
+}
+
+/// A plan shows what takes the time, and everything if that is asked for.
+#[test]
+fn a_plan_is_a_summary_unless_all_is_asked_for() {
+    let workspace = Workspace::new("summary");
+    let lines: String = (1..=60).map(|line| format!("G1 X{}\n", line * (1 + line % 7))).collect();
+    workspace.put("part.ngc", &format!("G21 G90 G61 F1200\n{lines}M2\n"));
+    let rows = |text: &str| text.lines().filter(|line| line.contains(" programmed ")).count();
+    let text = workspace.stdout(&["plan", "part.ngc"]);
+    assert_eq!(rows(&text), 20, "{text}");
+    assert!(text.contains("the 20 blocks that take longest, ") && text.contains("60 blocks, "), "{text}");
+    let all = workspace.stdout(&["plan", "part.ngc", "--all"]);
+    assert_eq!(rows(&all), 60, "{all}");
+}
+
+/// What is no program is named, and one without motion says so.
+#[test]
+fn what_is_no_program_is_named() {
+    let workspace = Workspace::new("no-program");
+    workspace.put("empty.ngc", "\n");
+    std::fs::write(workspace.0.join("wide.ngc"), b"\xFF\xFEG\x001\x00\n\x00").expect("a file");
+    workspace.put("still.ngc", "(only words)\nM2\n");
+    for command in ["run", "plan", "read"] {
+        let refusal = workspace.refusal(&[command, "empty.ngc"]);
+        assert!(refusal.contains("empty.ngc:1:1: found an empty file, expected G-code"), "{refusal}");
+        let refusal = workspace.refusal(&[command, "wide.ngc"]);
+        assert!(refusal.contains("found UTF-16 text, expected UTF-8 or ASCII"), "{refusal}");
+    }
+    for command in ["run", "plan"] {
+        let text = workspace.stdout(&[command, "still.ngc"]);
+        assert!(text.contains("note: nothing moves: the program has no motion"), "{text}");
+    }
+}
+
+/// Feeds are per minute, as in programs, or carry their unit.
+#[test]
+fn a_feed_is_per_minute_or_carries_its_unit() {
+    let workspace = Workspace::new("feeds");
+    let feed =
+        |text: &str| number(&workspace.json(&["jog", "X+30", "--feed", text, "--json"])[0]["feed_mm_s"]);
+    for text in ["1200", "20mm/s", "1200mm/min"] {
+        let found = feed(text);
+        assert!((found - 20.0).abs() < 1e-3, "{text}: {found}");
+    }
+    let refusal = wrong(&workspace, &["jog", "X+1", "--feed", "fast"]);
+    assert!(refusal.contains("found `fast`, expected a feed such as 3000 (mm/min)"), "{refusal}");
+}
+
+/// Commands are listed by purpose; shells and `man` get what they need.
+#[test]
+fn help_is_by_purpose_and_for_shells() {
+    let workspace = Workspace::new("help");
+    let help = workspace.stdout(&["--help"]);
+    for title in ["Look at a program:", "Drive a machine through a board:", "Set up this command:"] {
+        assert!(help.contains(title), "{help}");
+    }
+    assert!(workspace.stdout(&["completions", "bash"]).contains("complete -F _motion"));
+    assert!(workspace.stdout(&["completions", "fish"]).contains("complete -c motion"));
+    assert!(workspace.stdout(&["man"]).contains(".TH motion 1"));
+    workspace.stdout(&["man", "--directory", "pages"]);
+    assert!(workspace.read("pages/motion-send.1").contains("Drive a program on a board"));
+    assert!(!workspace.0.join("pages/motion-help.1").exists());
+}
