@@ -6,10 +6,12 @@ use std::path::PathBuf;
 use super::error::{CliError, Outcome};
 use super::progress::Progress;
 use super::trace::TraceWriter;
+use crate::check::{Reason, Times};
 use crate::files::{Failure, Files, FilesError, OutputFile};
-use crate::report;
+use crate::planning::Plan;
+use crate::report::{self, PageRun};
 use crate::simulate::{Job, Observer, RunError, RunInfo, RunSummary};
-use crate::trace::{RunTrace, TraceRow};
+use crate::trace::{RunTrace, TraceRow, TracedProgram};
 
 /// Opens the file of an option, if it is given.
 pub(super) fn open(
@@ -74,6 +76,10 @@ impl Written {
 pub(super) struct Outputs {
     trace: Option<OutputFile>,
     report: Option<OutputFile>,
+    /// What the report shows of the program.
+    program: Option<TracedProgram>,
+    /// The run that the report shows beside it.
+    against: Option<PageRun>,
 }
 
 impl Outputs {
@@ -82,21 +88,35 @@ impl Outputs {
         trace: Option<&PathBuf>,
         report: Option<&PathBuf>,
     ) -> Result<Self, FilesError> {
-        Ok(Self { trace: open(files, "--trace", trace)?, report: open(files, "--report", report)? })
+        let (trace, report) = (open(files, "--trace", trace)?, open(files, "--report", report)?);
+        Ok(Self { trace, report, program: None, against: None })
     }
 
     /// Only the report; `role` names its option.
     pub(super) fn report(files: &mut Files, role: &'static str, path: PathBuf) -> Result<Self, FilesError> {
-        Ok(Self { trace: None, report: open(files, role, Some(&path))? })
+        Ok(Self { trace: None, report: open(files, role, Some(&path))?, program: None, against: None })
+    }
+
+    /// With the program's text, and where the time of its plan goes.
+    pub(super) fn of_program<const N: usize>(mut self, text: &[u8], plan: &Plan<N>) -> Self {
+        self.program = Some(traced(text, plan));
+        self
+    }
+
+    /// With another run beside it.
+    pub(super) fn against(mut self, run: PageRun) -> Self {
+        self.against = Some(run);
+        self
     }
 
     /// Runs a job with `run` and writes the files about it. A run that can't be made leaves no files.
     pub(super) fn of_run<const N: usize, T>(
-        self,
+        mut self,
         job: &Job<N>,
         run: impl FnOnce(&mut Observer<'_, N>) -> Result<T, RunError>,
         summary_of: impl Fn(&T) -> &RunSummary,
     ) -> Result<(T, Written), CliError> {
+        let source = self.program.take();
         let (ran, ticks) = self.of_ticks(&job.info, |observe| {
             let mut progress = Progress::new((job.info.planned_time_s / job.info.tick_s) as u64);
             let ran = run(&mut |tick| {
@@ -107,7 +127,7 @@ impl Outputs {
             ran
         });
         let ran = ran.map_err(|source| CliError::Run { program: job.info.program.clone(), source })?;
-        let written = ticks.write(|ticks| trace_of(job, summary_of(&ran), ticks));
+        let written = ticks.write(|ticks| RunTrace { source, ..trace_of(job, summary_of(&ran), ticks) });
         Ok((ran, written))
     }
 
@@ -127,7 +147,7 @@ impl Outputs {
             let (name, failure) = (output.name().to_owned(), output.failure());
             (name, failure, TraceWriter::new(output, info))
         });
-        let mut ticks = Ticks { trace, report: self.report, ticks: Vec::new() };
+        let mut ticks = Ticks { trace, report: self.report, against: self.against, ticks: Vec::new() };
         let ran = run(&mut |tick| ticks.add(tick));
         (ran, ticks)
     }
@@ -137,6 +157,7 @@ impl Outputs {
 pub(super) struct Ticks<const N: usize> {
     trace: Option<(String, Failure, TraceWriter<OutputFile>)>,
     report: Option<OutputFile>,
+    against: Option<PageRun>,
     ticks: Vec<TraceRow<N>>,
 }
 
@@ -157,13 +178,29 @@ impl<const N: usize> Ticks<N> {
             let done = writer.finish().map_err(|source| failure.of(source));
             written.add("trace", name, done.and_then(OutputFile::commit));
         }
-        let ticks = self.ticks;
-        written.write("report", self.report, |file| report::write_html(&trace(ticks), file));
+        let (ticks, against) = (self.ticks, self.against);
+        written
+            .write("report", self.report, |file| report::write_html(&trace(ticks), against.as_ref(), file));
         written
     }
 }
 
-fn trace_of<const N: usize>(job: &Job<N>, summary: &RunSummary, ticks: Vec<TraceRow<N>>) -> RunTrace<N> {
+/// A program for the report of its run.
+pub(super) fn traced<const N: usize>(text: &[u8], plan: &Plan<N>) -> TracedProgram {
+    let times = Times::of(plan);
+    let of_reason = |reason: Reason| (reason.words(), times.of_reason_s(reason));
+    TracedProgram {
+        text: String::from_utf8_lossy(text).into_owned(),
+        times: Reason::ALL.map(of_reason).into_iter().filter(|(_, time_s)| *time_s > 0.0).collect(),
+    }
+}
+
+/// What a run leaves behind.
+pub(super) fn trace_of<const N: usize>(
+    job: &Job<N>,
+    summary: &RunSummary,
+    ticks: Vec<TraceRow<N>>,
+) -> RunTrace<N> {
     let mut trace = RunTrace {
         ticks,
         end: summary.end,

@@ -45,6 +45,11 @@ fn an_output_is_no_input() {
         (&["run", "part.ngc", "--report", "part.ngc"], "PROGRAM part.ngc", "--report part.ngc"),
         (&["run", "part.ngc", "--report", "./part.ngc"], "PROGRAM part.ngc", "--report ./part.ngc"),
         (
+            &["run", "part.ngc", "--report", "part.mrec", "--against", "part.mrec"],
+            "--against part.mrec",
+            "--report part.mrec",
+        ),
+        (
             &["run", "part.ngc", "--record", "../cli-same-input/part.ngc"],
             "PROGRAM part.ngc",
             "--record ../cli-same-input/part.ngc",

@@ -1,0 +1,590 @@
+// The path: in space or in a plane, coloured by what holds there, with the actual path beside the set one.
+//
+// What is drawn are the corners of the coarsest picture that is within half a pixel of the path. A straight part between two
+// corners may be driven at many feeds, so it is drawn in parts of some pixels, each with its own colour.
+
+import { figure, marks, roundStep } from "page/format.js";
+import { Sheet } from "page/plot.js";
+import { dashes, ink, onChange, shade } from "page/theme.js";
+import { nextFrame, work } from "page/work.js";
+
+/** The greatest distance of the drawn path from the true one, in pixels of the screen. */
+const OFF_PX = 0.5;
+/** Length of a part of one colour [px]; while the view moves, longer ones do. */
+const PART_PX = 4;
+const PART_MOVING_PX = 16;
+/** Colours between slow and fast. */
+const SHADES = 32;
+/** Space around the path [px]. */
+const AIR_PX = 28;
+/** A pointer finds the path from this near [px]. */
+const NEAR_PX = 14;
+/** The feed that is at its ceiling: plans keep off by less. */
+const AT_CEILING = 0.999;
+/** Exaggerations of the error. */
+const FACTORS = [0, 10, 30, 100, 300, 1000, 3000, 10000];
+
+export class PathView {
+  constructor(state) {
+    this.state = state;
+    this.figure = document.getElementById("path");
+    const { views } = state.run.header;
+    if (views.length === 0 || state.run.outline.ticks.length === 0) {
+      this.figure.hidden = true;
+      return;
+    }
+    this.stage = this.figure.querySelector(".stage");
+    this.sheet = new Sheet(this.stage);
+    this.dot = this.stage.appendChild(document.createElement("i"));
+    this.dot.className = "dot";
+    this.colours = this.choices();
+    this.colour = this.colours[0];
+    this.factor = 0;
+    this.view = views[0];
+    this.makeTools(views);
+    this.fit();
+    this.listen();
+    this.redraw = () => this.draw();
+    state.on("cursor", () => nextFrame(() => this.place()));
+    new ResizeObserver(() => {
+      if (!this.isMoved) this.fit();
+      nextFrame(this.redraw);
+    }).observe(this.stage);
+    onChange(() => this.draw());
+    nextFrame(this.redraw);
+  }
+
+  /** What the path may be coloured by: a name, and its class for ticks of a run, with what the classes mean. */
+  choices() {
+    const { run } = this.state;
+    const { blocks } = run;
+    const greatest = (values, isOf) => values.reduce((most, value, i) => (isOf(i) && value > most ? value : most), 0);
+    const feed = run.quantity("feed");
+    const cutting = greatest(blocks.peak, (i) => !blocks.isRapid[i]);
+    const scale = (name, unit, words, most, value) => ({
+      name,
+      classOf: (from, to) => Math.min(SHADES - 1, Math.floor((value(from, to) / most) * SHADES)),
+      inkOf: (number) => shade((number + 0.5) / SHADES),
+      legend: () => [{ isScale: true, from: "0", to: `${figure(most, 3)} ${unit}` }],
+      words,
+    });
+    const whole = feed.range(0, run.samples) ? feed.high : 1;
+    const samples = (from, to) => [run.sampleOf(from), Math.max(run.sampleOf(from) + 1, run.sampleOf(to))];
+    const list = [
+      scale("Feed", "mm/s", "Lowest feed of each part.", cutting || whole || 1, (from, to) => {
+        feed.range(...samples(from, to));
+        return feed.low;
+      }),
+    ];
+    if (blocks.count) {
+      const { reasons } = run.header;
+      const changing = reasons.length;
+      list.push({
+        name: "Limit",
+        classOf: (from, to) => {
+          const block = run.blockAt(run.pathMm((from + to) / 2));
+          feed.range(...samples(from, to));
+          const isAt = feed.high >= AT_CEILING * blocks.ceiling[block];
+          return isAt && reasons[blocks.reason[block]][1] !== "unreached" ? blocks.reason[block] : changing;
+        },
+        inkOf: (number) => ink(number === changing ? "unreached" : reasons[number][1]),
+        legend: () => [
+          ...reasons.filter(([, of]) => of !== "unreached").map(([name, of]) => ({ ink: of, name })),
+          { ink: "unreached", name: "feed changes" },
+        ],
+        words: "What holds the feed down: a ceiling, or the way to the next one.",
+      });
+    }
+    const errors = (name, columns, words) => {
+      const quantities = columns.map((column) => run.quantity(column)).filter(Boolean);
+      const value = (from, to) => quantities.reduce((most, quantity) =>
+        quantity.range(...samples(from, to)) ? Math.max(most, -quantity.low, quantity.high) : most, 0);
+      const most = value(0, run.ticks);
+      if (quantities.length && most > 0) list.push(scale(name, "µm", words, most, value));
+    };
+    const axes = run.header.axes.map((axis, i) => ({ ...axis, i })).filter((axis) => axis.is_on_path);
+    errors("Following error", axes.map((axis) => `error ${axis.i}`), "Greatest following error of an axis in each part.");
+    errors("Contour error", ["contour"], "Greatest contour error of each part.");
+    return list;
+  }
+
+  makeTools(views) {
+    const tools = this.figure.querySelector(".tools");
+    const group = (name, items, choose) => {
+      const box = tools.appendChild(document.createElement("div"));
+      box.className = "choice";
+      box.setAttribute("role", "group");
+      box.setAttribute("aria-label", name);
+      const buttons = items.map((item, i) => {
+        const button = box.appendChild(document.createElement("button"));
+        button.type = "button";
+        button.textContent = item;
+        button.setAttribute("aria-pressed", String(i === 0));
+        button.addEventListener("click", () => {
+          for (const other of buttons) other.setAttribute("aria-pressed", String(other === button));
+          choose(i);
+        });
+        return button;
+      });
+    };
+    if (views.length > 1) {
+      group("View", views.map(([name]) => name), (i) => {
+        this.view = views[i];
+        this.fit();
+        nextFrame(this.redraw);
+      });
+    }
+    group("Colour", this.colours.map((colour) => colour.name), (i) => {
+      this.colour = this.colours[i];
+      nextFrame(this.redraw);
+    });
+    const label = tools.appendChild(document.createElement("label"));
+    label.append("Actual path ");
+    const select = label.appendChild(document.createElement("select"));
+    for (const factor of FACTORS) select.append(new Option(factor ? `error × ${factor}` : "not shown", factor));
+    select.addEventListener("change", () => {
+      this.factor = Number(select.value);
+      nextFrame(this.redraw);
+    });
+    const whole = tools.appendChild(document.createElement("button"));
+    whole.type = "button";
+    whole.className = "whole";
+    whole.textContent = "Fit";
+    whole.addEventListener("click", () => this.showAll());
+  }
+
+  showAll() {
+    this.fit();
+    nextFrame(this.redraw);
+  }
+
+  get isInSpace() {
+    return this.view[1].length === 3;
+  }
+
+  /** Directions on the screen, to the right and downwards, of the view's axes. */
+  directions() {
+    if (!this.isInSpace) return [[1, 0], [0, -1]];
+    const [sy, cy, sp, cp] = [Math.sin(this.yaw), Math.cos(this.yaw), Math.sin(this.pitch), Math.cos(this.pitch)];
+    return [[cy, sy * sp], [sy, -cy * sp], [0, -cp]];
+  }
+
+  /** Sees the whole path. */
+  fit() {
+    // From the front, the right and above.
+    if (!this.isMoved || !this.isInSpace) [this.yaw, this.pitch] = [-0.6, 0.6];
+    this.isMoved = false;
+    const axes = this.view[1];
+    const spans = axes.map((axis) => {
+      const all = this.state.runs.flatMap((run) => {
+        const values = run.outline.places[axis];
+        return values ? [values.reduce((a, b) => Math.min(a, b), Infinity), values.reduce((a, b) => Math.max(a, b), -Infinity)] : [];
+      });
+      return [Math.min(...all), Math.max(...all)];
+    });
+    this.pivot = spans.map(([low, high]) => (low + high) / 2);
+    this.offset = [0, 0];
+    const directions = this.directions();
+    const size = [0, 1].map((way) =>
+      directions.reduce((sum, direction, i) => sum + Math.abs(direction[way]) * (spans[i][1] - spans[i][0]), 0));
+    const [width, height] = [this.stage.clientWidth, this.stage.clientHeight];
+    const [w, h] = [width - 2 * AIR_PX, height - 2 * AIR_PX];
+    const scale = Math.min(w / (size[0] || 1e-9), h / (size[1] || 1e-9));
+    // A point has no size; it gets a millimetre.
+    this.scale = this.limited(size[0] || size[1] ? scale : Math.min(w, h));
+  }
+
+  /** Pixels to a millimetre: no more than the data resolve. */
+  limited(scale) {
+    const ratio = window.devicePixelRatio || 1;
+    return Math.min(scale, OFF_PX / (this.state.run.outline.toleranceMm * ratio));
+  }
+
+  /** Draws all. While the view moves, coarser colours do. */
+  draw(isMoving = false) {
+    this.sheet.measure();
+    const { width, height } = this.sheet.clear();
+    if (width < 10) return;
+    const { context } = this.sheet;
+    const { state } = this;
+    this.size = [width, height];
+    const directions = this.directions();
+    const axes = this.view[1];
+    this.project = (place) => {
+      let [x, y] = [width / 2 + this.offset[0], height / 2 + this.offset[1]];
+      for (let i = 0; i < axes.length; i += 1) {
+        const mm = (place[axes[i]] - this.pivot[i]) * this.scale;
+        x += directions[i][0] * mm;
+        y += directions[i][1] * mm;
+      }
+      return [x, y];
+    };
+    if (this.isInSpace) this.drawTriad(context, directions, axes);
+    else this.drawGrid(context, axes);
+    this.parts = [];
+    for (const run of state.runs.slice(1)) this.drawPlain(context, run, "axis", 0);
+    this.drawColoured(context, isMoving ? PART_MOVING_PX : PART_PX);
+    if (this.factor) this.drawPlain(context, state.run, "error", this.factor);
+    this.drawEnds(context);
+    this.tellLegend();
+    this.place();
+    // Colours in full when the view has come to rest.
+    clearTimeout(this.later);
+    if (isMoving) this.later = setTimeout(() => nextFrame(this.redraw), 120);
+  }
+
+  /** Calls `part` with ends on the screen and ticks of every part of the path that may be seen, in order. */
+  walk(run, partPx, part) {
+    const { outline } = run;
+    const ratio = window.devicePixelRatio || 1;
+    const corners = outline.within(OFF_PX / ratio / this.scale);
+    const axes = this.view[1];
+    const place = [];
+    const at = (i) => {
+      for (const axis of axes) place[axis] = outline.places[axis][i];
+      return this.project(place);
+    };
+    const [width, height] = this.size;
+    let from = at(corners[0]);
+    for (let n = 1; n < corners.length; n += 1) {
+      const [i, j] = [corners[n - 1], corners[n]];
+      const to = at(j);
+      const isSeen = Math.max(from[0], to[0]) > -9 && Math.min(from[0], to[0]) < width + 9 &&
+        Math.max(from[1], to[1]) > -9 && Math.min(from[1], to[1]) < height + 9;
+      if (isSeen) {
+        const [start, end] = [outline.ticks[i], outline.ticks[j]];
+        const length = Math.hypot(to[0] - from[0], to[1] - from[1]);
+        const count = Math.max(1, Math.min(Math.ceil(length / partPx), Math.ceil((end - start) / run.ticksPerSample), 4000));
+        let [x, y, tick] = [from[0], from[1], start];
+        for (let k = 1; k <= count; k += 1) {
+          work.parts += 1;
+          const next = k === count ? end : start + ((end - start) * k) / count;
+          const share = k === count ? 1 : run.partBetween(start, end, next);
+          const [px, py] = [from[0] + (to[0] - from[0]) * share, from[1] + (to[1] - from[1]) * share];
+          part(x, y, px, py, tick, next);
+          [x, y, tick] = [px, py, next];
+        }
+      }
+      from = to;
+    }
+  }
+
+  drawColoured(context, partPx) {
+    const { run } = this.state;
+    const { blocks } = run;
+    const lines = new Map();
+    let [last, lastX, lastY] = [null, NaN, NaN];
+    this.hasRapids = false;
+    this.walk(run, partPx, (x0, y0, x1, y1, from, to) => {
+      this.parts.push(x0, y0, x1, y1, from, to);
+      const isRapid = blocks.count > 0 && blocks.isRapid[run.blockAt(run.pathMm((from + to) / 2))] === 1;
+      const number = isRapid ? "rapid" : Math.max(0, this.colour.classOf(from, to) || 0);
+      if (!lines.has(number)) lines.set(number, new Path2D());
+      const line = lines.get(number);
+      if (number !== last || x0 !== lastX || y0 !== lastY) line.moveTo(x0, y0);
+      line.lineTo(x1, y1);
+      [last, lastX, lastY] = [number, x1, y1];
+    });
+    // Round ends would reach into parts of another colour.
+    context.lineCap = "butt";
+    context.lineJoin = "round";
+    const rapid = lines.get("rapid");
+    if (rapid) {
+      this.hasRapids = true;
+      lines.delete("rapid");
+      context.strokeStyle = ink("axis");
+      context.lineWidth = 1;
+      context.setLineDash([5, 4]);
+      context.stroke(rapid);
+      context.setLineDash([]);
+    }
+    context.lineWidth = 2.2;
+    for (const [number, line] of [...lines].sort((a, b) => a[0] - b[0])) {
+      context.strokeStyle = this.colour.inkOf(number);
+      context.stroke(line);
+    }
+  }
+
+  /** A path in one colour; the actual one with its error times `factor`, or the set one. */
+  drawPlain(context, run, name, factor) {
+    const axes = this.view[1];
+    const errors = axes.map((axis) => run.quantity(`error ${axis}`));
+    const directions = this.directions();
+    const off = (tick) => {
+      let [dx, dy] = [0, 0];
+      const sample = run.sampleOf(tick);
+      errors.forEach((error, i) => {
+        if (!factor || !error?.range(sample, sample + 1)) return;
+        // Set minus actual; a sample of several ticks is drawn in the middle of its range.
+        const px = ((error.low + error.high) / -2) * 1e-3 * factor * this.scale;
+        dx += directions[i][0] * px;
+        dy += directions[i][1] * px;
+      });
+      return [dx, dy];
+    };
+    const line = new Path2D();
+    let [lastX, lastY] = [NaN, NaN];
+    this.walk(run, factor ? PART_PX : 1e9, (x0, y0, x1, y1, from, to) => {
+      if (x0 !== lastX || y0 !== lastY) {
+        const [dx, dy] = off(from);
+        line.moveTo(x0 + dx, y0 + dy);
+      }
+      const [dx, dy] = off(to);
+      line.lineTo(x1 + dx, y1 + dy);
+      [lastX, lastY] = [x1, y1];
+    });
+    context.strokeStyle = ink(name);
+    context.lineWidth = factor ? 1.2 : 1.6;
+    context.stroke(line);
+  }
+
+  /** Round places of the plane, and their coordinates. */
+  drawGrid(context, axes) {
+    const [width, height] = this.size;
+    const { header } = this.state.run;
+    const low = [this.pivot[0] - (width / 2 + this.offset[0]) / this.scale, this.pivot[1] - (height / 2 - this.offset[1]) / this.scale];
+    const high = [low[0] + width / this.scale, low[1] + height / this.scale];
+    const text = (value, decimals) => (Math.abs(value) < 1e-9 ? "0" : value.toFixed(decimals).replace("-", "−"));
+    context.lineWidth = 1;
+    context.strokeStyle = ink("grid");
+    const step = roundStep(width / this.scale, width / 80);
+    for (const [way, size] of [[0, width], [1, height]]) {
+      const { values, decimals } = marks(low[way], high[way], (high[way] - low[way]) / step);
+      for (const value of values) {
+        const px = way === 0 ? (value - low[0]) * this.scale : height - (value - low[1]) * this.scale;
+        const at = Math.round(px) + 0.5;
+        context.beginPath();
+        context.moveTo(way ? 0 : at, way ? at : 0);
+        context.lineTo(way ? width : at, way ? at : height);
+        context.stroke();
+        context.fillStyle = ink("soft");
+        context.textAlign = way ? "left" : "center";
+        context.textBaseline = way ? "middle" : "alphabetic";
+        // Corners are for the names of the axes.
+        if (px > 24 && px < size - (way ? 24 : 60)) context.fillText(text(value, decimals), way ? 4 : at, way ? at - 7 : height - 5);
+      }
+    }
+    context.fillStyle = ink("text");
+    context.textBaseline = "alphabetic";
+    context.textAlign = "right";
+    context.fillText(`${header.axes[axes[0]].name} [mm]`, width - 5, height - 5);
+    context.textAlign = "left";
+    context.fillText(`${header.axes[axes[1]].name} [mm]`, 4, 14);
+  }
+
+  /** Where the axes point, and how long a round length is. */
+  drawTriad(context, directions, axes) {
+    const [, height] = this.size;
+    const { header } = this.state.run;
+    const [x, y, length] = [42, height - 42, 28];
+    context.lineWidth = 1.5;
+    context.textAlign = "center";
+    context.textBaseline = "middle";
+    axes.forEach((axis, i) => {
+      const [dx, dy] = directions[i];
+      context.strokeStyle = ink("axis");
+      context.beginPath();
+      context.moveTo(x, y);
+      context.lineTo(x + length * dx, y + length * dy);
+      context.stroke();
+      context.fillStyle = ink("text");
+      context.fillText(header.axes[axis].name, x + (length + 9) * dx, y + (length + 9) * dy);
+    });
+    const bar = roundStep(90 / this.scale, 1);
+    const long = Math.min(bar, bar / Math.ceil((bar * this.scale) / 160)) * this.scale;
+    const mm = long / this.scale;
+    const right = this.size[0] - 14;
+    context.strokeStyle = ink("axis");
+    context.beginPath();
+    context.moveTo(right - long, height - 20);
+    context.lineTo(right - long, height - 14);
+    context.lineTo(right, height - 14);
+    context.lineTo(right, height - 20);
+    context.stroke();
+    context.fillStyle = ink("soft");
+    context.textAlign = "right";
+    context.fillText(`${figure(mm, 3)} mm`, right, height - 28);
+  }
+
+  /** Start: a ring; end: a square; faults: crosses. */
+  drawEnds(context) {
+    const { run } = this.state;
+    const at = (tick) => this.project(run.placeAt(tick));
+    context.strokeStyle = ink("text");
+    context.fillStyle = ink("text");
+    context.lineWidth = 1.6;
+    const [sx, sy] = at(0);
+    context.beginPath();
+    context.arc(sx, sy, 5, 0, 7);
+    context.stroke();
+    const [ex, ey] = at(run.ticks - 1);
+    context.fillRect(ex - 3, ey - 3, 6, 6);
+    context.strokeStyle = ink("fault");
+    context.lineWidth = 2.4;
+    for (const { tick } of run.header.faults) {
+      const [x, y] = at(tick - run.firstTick);
+      context.beginPath();
+      context.moveTo(x - 7, y - 7);
+      context.lineTo(x + 7, y + 7);
+      context.moveTo(x - 7, y + 7);
+      context.lineTo(x + 7, y - 7);
+      context.stroke();
+    }
+  }
+
+  tellLegend() {
+    const { run, runs } = this.state;
+    const entries = this.colour.legend();
+    if (this.hasRapids) entries.push({ ink: "axis", name: "rapid", isDashed: true });
+    if (this.factor) entries.push({ ink: "error", name: `actual, error × ${this.factor}` });
+    if (runs.length > 1) entries.push({ ink: "axis", name: runs[1].header.program });
+    const items = entries.map((entry) => {
+      const item = document.createElement("li");
+      if (entry.isScale) {
+        item.className = "scale";
+        const bar = document.createElement("i");
+        bar.style.background = `linear-gradient(90deg,${[0, 0.2, 0.4, 0.6, 0.8, 1].map(shade).join(",")})`;
+        item.append(entry.from, bar, entry.to);
+      } else {
+        item.style.setProperty("--key", `var(--${entry.ink})`);
+        if (entry.isDashed) item.className = "dashed";
+        item.textContent = entry.name;
+      }
+      return item;
+    });
+    this.figure.querySelector(".legend").replaceChildren(...items);
+    const finest = figure(run.outline.toleranceMm * 1e3, 2);
+    const words = `${this.colour.words} Ring: start; square: end${run.header.faults.length ? "; cross: fault" : ""}.`;
+    this.figure.querySelector("figcaption").textContent =
+      `${words} Drawn within half a pixel; the data hold the path within ${finest} µm, where zooming ends.`;
+  }
+
+  /** Moves the dot to the cursor. */
+  place() {
+    if (!this.project) return;
+    const { run, cursor } = this.state;
+    const [x, y] = this.project(run.placeAt(cursor));
+    this.dot.hidden = !(x > -6 && y > -6 && x < this.size[0] + 6 && y < this.size[1] + 6);
+    if (!this.dot.hidden) this.dot.style.transform = `translate(${x}px,${y}px)`;
+  }
+
+  /** The tick of the path nearest to a place of the stage; undefined if none is near. */
+  tickNear(x, y) {
+    let [nearest, tick] = [NEAR_PX ** 2, undefined];
+    const { parts } = this;
+    for (let i = 0; i < parts.length; i += 6) {
+      const [dx, dy] = [parts[i + 2] - parts[i], parts[i + 3] - parts[i + 1]];
+      const square = dx * dx + dy * dy;
+      const along = (x - parts[i]) * dx + (y - parts[i + 1]) * dy;
+      const share = square > 0 ? Math.min(1, Math.max(0, along / square)) : 0;
+      const away = (x - parts[i] - share * dx) ** 2 + (y - parts[i + 1] - share * dy) ** 2;
+      if (away < nearest) [nearest, tick] = [away, parts[i + 4] + share * (parts[i + 5] - parts[i + 4])];
+    }
+    return tick;
+  }
+
+  zoom(x, y, factor) {
+    const scale = this.limited(this.scale * factor);
+    const by = scale / this.scale;
+    const [width, height] = this.size;
+    // What is under the pointer stays there.
+    this.offset[0] = x - width / 2 - (x - width / 2 - this.offset[0]) * by;
+    this.offset[1] = y - height / 2 - (y - height / 2 - this.offset[1]) * by;
+    this.scale = scale;
+    this.move();
+  }
+
+  move() {
+    this.isMoved = true;
+    this.redrawMoving ??= () => this.draw(true);
+    nextFrame(this.redrawMoving);
+  }
+
+  listen() {
+    const { stage, state } = this;
+    const fingers = new Map();
+    let drag = null;
+    const at = (event) => {
+      const box = stage.getBoundingClientRect();
+      return [event.clientX - box.left, event.clientY - box.top];
+    };
+    const centre = () => {
+      const all = [...fingers.values()];
+      const mean = (way) => all.reduce((sum, place) => sum + place[way], 0) / all.length;
+      return { x: mean(0), y: mean(1), spread: all.length > 1 ? Math.hypot(all[0][0] - all[1][0], all[0][1] - all[1][1]) : 0 };
+    };
+    stage.addEventListener("pointerdown", (event) => {
+      stage.setPointerCapture(event.pointerId);
+      fingers.set(event.pointerId, at(event));
+      const turns = this.isInSpace && fingers.size === 1 && event.button === 0 && !event.shiftKey;
+      drag = { ...centre(), turns, far: 0 };
+    });
+    stage.addEventListener("pointermove", (event) => {
+      if (!drag) {
+        const tick = event.pointerType === "mouse" ? this.tickNear(...at(event)) : undefined;
+        if (tick === undefined) state.leave();
+        else state.hover(tick);
+        return;
+      }
+      if (!fingers.has(event.pointerId)) return;
+      fingers.set(event.pointerId, at(event));
+      const now = centre();
+      const [dx, dy] = [now.x - drag.x, now.y - drag.y];
+      drag.far += Math.abs(dx) + Math.abs(dy);
+      if (drag.turns) {
+        this.yaw += dx / 150;
+        this.pitch = Math.min(Math.PI / 2, Math.max(-Math.PI / 2, this.pitch + dy / 150));
+      } else {
+        this.offset[0] += dx;
+        this.offset[1] += dy;
+        if (drag.spread && now.spread) this.zoom(now.x, now.y, now.spread / drag.spread);
+      }
+      Object.assign(drag, now);
+      if (drag.far > 3) this.move();
+    });
+    const end = (event) => {
+      // A pointer that stayed where it was points at the path.
+      if (drag && drag.far <= 3 && fingers.size === 1) {
+        const tick = this.tickNear(...at(event));
+        if (tick !== undefined) state.visit(tick);
+      }
+      fingers.delete(event.pointerId);
+      drag = fingers.size ? { ...centre(), turns: false, far: 99 } : null;
+    };
+    stage.addEventListener("pointerup", end);
+    stage.addEventListener("pointercancel", end);
+    stage.addEventListener("pointerleave", () => drag || state.leave());
+    stage.addEventListener("contextmenu", (event) => event.preventDefault());
+    stage.addEventListener("dblclick", () => this.showAll());
+    stage.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.zoom(...at(event), 2 ** (-event.deltaY / 300));
+    }, { passive: false });
+    stage.addEventListener("keydown", (event) => {
+      const [w, h] = this.size;
+      const turn = (yaw, pitch) => {
+        if (this.isInSpace) {
+          this.yaw += yaw;
+          this.pitch = Math.min(Math.PI / 2, Math.max(-Math.PI / 2, this.pitch + pitch));
+        } else {
+          this.offset[0] -= yaw * 200;
+          this.offset[1] -= pitch * 200;
+        }
+        this.move();
+      };
+      const actions = {
+        "+": () => this.zoom(w / 2, h / 2, 1.5),
+        "=": () => this.zoom(w / 2, h / 2, 1.5),
+        "-": () => this.zoom(w / 2, h / 2, 1 / 1.5),
+        0: () => this.showAll(),
+        ArrowLeft: () => turn(-0.1, 0),
+        ArrowRight: () => turn(0.1, 0),
+        ArrowUp: () => turn(0, -0.1),
+        ArrowDown: () => turn(0, 0.1),
+      };
+      if (!(event.key in actions) || event.ctrlKey || event.metaKey || event.altKey) return;
+      actions[event.key]();
+      event.preventDefault();
+    });
+  }
+}

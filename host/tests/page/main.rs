@@ -1,0 +1,50 @@
+//! The page in a browser: what it shows is what the run came to, and it answers pointers, wheel and keys.
+//!
+//! Needs `chromium` and `chromedriver`; without them every test is listed and ignored with the reason, but fails where
+//! `CI=true`. Work is counted, and no clock is read.
+
+mod browser;
+mod long;
+mod report;
+#[allow(dead_code, reason = "the suite uses the rest of it")]
+#[path = "../cli/workspace.rs"]
+mod workspace;
+
+use std::process::ExitCode;
+
+use libtest_mimic::{Arguments, Failed, Trial};
+
+const TESTS: [(&str, fn()); 10] = [
+    ("a_long_run_is_told_in_samples", long::a_long_run_is_told_in_samples),
+    ("pyramids_neither_lose_nor_invent_peaks", long::pyramids_neither_lose_nor_invent_peaks),
+    ("figures_are_those_of_the_run", report::figures_are_those_of_the_run),
+    ("the_cursor_is_dragged", report::the_cursor_is_dragged),
+    ("the_wheel_zooms", report::the_wheel_zooms),
+    ("keys_move_cursor_and_window", report::keys_move_cursor_and_window),
+    ("colours_are_switched", report::colours_are_switched),
+    ("worst_places_are_visited", report::worst_places_are_visited),
+    ("two_runs_lie_beside_each_other", report::two_runs_lie_beside_each_other),
+    ("a_phone_shows_all_of_it", report::a_phone_shows_all_of_it),
+];
+
+fn main() -> ExitCode {
+    let arguments = Arguments::from_args();
+    let is_ci = std::env::var("CI").is_ok_and(|value| value == "true");
+    let reason = browser::missing();
+    let trial = |(name, test): (&'static str, fn())| {
+        let missing = reason.clone();
+        let run = move || match missing {
+            None => {
+                test();
+                Ok(())
+            }
+            Some(reason) => Err(Failed::from(reason)),
+        };
+        match &reason {
+            // The kind is what the harness prints next to the name.
+            Some(reason) if !is_ci => Trial::test(name, run).with_kind(reason).with_ignored_flag(true),
+            _ => Trial::test(name, run),
+        }
+    };
+    libtest_mimic::run(&arguments, TESTS.map(trial).into()).exit_code()
+}
