@@ -12,7 +12,8 @@ import { work } from "page/work.js";
 
 async function start(source) {
   const runs = (await source()).runs.map(({ data, program }) => new Run(data, program));
-  if (runs.length === 0 || runs[0].ticks === 0) return null;
+  if (runs.some((run) => run.ticks === 0)) return null;
+  for (const other of runs.slice(1)) other.matchAxes(runs[0]);
   const state = new State(runs);
   document.getElementById("workbench").hidden = false;
   const code = new Code(state);

@@ -239,6 +239,8 @@ export class PathView {
     const ratio = window.devicePixelRatio || 1;
     const corners = outline.within(OFF_PX / ratio / this.scale);
     const axes = this.view[1];
+    // Another machine may lack an axis.
+    if (corners.length === 0 || axes.some((axis) => outline.places[axis] === null)) return;
     const place = [];
     const at = (i) => {
       for (const axis of axes) place[axis] = outline.places[axis][i];

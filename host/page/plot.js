@@ -156,7 +156,8 @@ export class Plot {
           for (let i = 0; i < count; i += 1) {
             // Before the run and behind its end there is nothing.
             if (ticks[i + 1] < 0 || ticks[i] > run.ticks - 1) continue;
-            if (ticks[i] === ticks[i + 1] && i > 0 && this.state.over === "path" && ticks[i] >= run.ticks - 1) continue;
+            // Nor behind the end of its path, where every position has its last tick.
+            if (this.state.over === "path" && ticks[i] === ticks[i + 1] && ticks[i] === run.ticks - 1) continue;
             const from = run.sampleOf(ticks[i]);
             const to = Math.max(from + 1, Math.ceil(Math.min(run.ticks, ticks[i + 1]) / run.ticksPerSample));
             work.columns += 1;

@@ -87,10 +87,19 @@ export class Run {
     this.ceilingStep = data.step("block ceiling");
   }
 
+  /** Numbers its axes as another run does, so that axes of one name lie on each other. */
+  matchAxes(other) {
+    const own = this.header.axes;
+    this.axes = other.header.axes.map(({ name }) => own.findIndex((axis) => axis.name === name));
+    this.outline.places = this.axes.map((axis) => this.outline.places[axis] ?? null);
+  }
+
   /** A quantity by the name of its column; null if the run has none. */
   quantity(name) {
     if (!this.quantities.has(name)) {
-      this.quantities.set(name, this.data.has(name) ? new Quantity(this.data, name) : null);
+      const [of, axis] = name.split(" ");
+      const column = this.axes && axis ? `${of} ${this.axes[axis]}` : name;
+      this.quantities.set(name, this.data.has(column) ? new Quantity(this.data, column) : null);
     }
     return this.quantities.get(name);
   }

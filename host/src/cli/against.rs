@@ -1,6 +1,6 @@
 //! The run that a report shows beside another one.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use super::error::CliError;
 use super::input::{self, ReadingArguments, Source};
@@ -18,7 +18,7 @@ use crate::trace::{RunTrace, TracedProgram};
 /// # Errors
 /// The file is refused, there is no plan, or it can't be run.
 pub(super) fn run<const N: usize>(
-    path: &PathBuf,
+    path: &Path,
     reading: &ReadingArguments,
     machine: &Machine<N>,
 ) -> Result<PageRun, CliError> {

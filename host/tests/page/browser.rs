@@ -114,7 +114,8 @@ impl Browser {
             json!(selector)
         );
         let found = self.run(&script);
-        [0, 1].map(|i| found[i].as_f64().expect("a place"))
+        // Pointers are at whole pixels.
+        [0, 1].map(|i| found[i].as_f64().expect("a place").floor())
     }
 
     /// Moves the pointer along places with the button pressed.

@@ -14,7 +14,7 @@ use std::process::ExitCode;
 
 use libtest_mimic::{Arguments, Failed, Trial};
 
-const TESTS: [(&str, fn()); 10] = [
+const TESTS: [(&str, fn()); 11] = [
     ("a_long_run_is_told_in_samples", long::a_long_run_is_told_in_samples),
     ("pyramids_neither_lose_nor_invent_peaks", long::pyramids_neither_lose_nor_invent_peaks),
     ("figures_are_those_of_the_run", report::figures_are_those_of_the_run),
@@ -24,6 +24,7 @@ const TESTS: [(&str, fn()); 10] = [
     ("colours_are_switched", report::colours_are_switched),
     ("worst_places_are_visited", report::worst_places_are_visited),
     ("two_runs_lie_beside_each_other", report::two_runs_lie_beside_each_other),
+    ("faults_and_commands_are_marked", report::faults_and_commands_are_marked),
     ("a_phone_shows_all_of_it", report::a_phone_shows_all_of_it),
 ];
 

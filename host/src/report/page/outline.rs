@@ -7,6 +7,8 @@
 //! The rule is Douglas and Peucker's: between two vertices the point farthest from their chord is one, too, if it is farther
 //! than the tolerance. It is applied once, to the finest tolerance; the distance at which a point was taken in is its rank.
 
+use crate::toolpath::{dot, subtract};
+
 /// Points that are looked at together: so a point is looked at a bounded number of times.
 const CHUNK: usize = 1024;
 
@@ -90,23 +92,16 @@ struct Chord<const D: usize> {
 
 impl<const D: usize> Chord<D> {
     fn new(from: [f64; D], to: [f64; D]) -> Self {
-        let along: [f64; D] = std::array::from_fn(|axis| to[axis] - from[axis]);
-        Self { from, along, length_squared: along.iter().map(|part| part * part).sum() }
+        let along = subtract(to, from);
+        Self { from, along, length_squared: dot(along, along) }
     }
 
     /// To the nearest point between its ends.
     fn distance_squared(&self, point: [f64; D]) -> f64 {
-        let mut at = 0.0;
-        for axis in 0..D {
-            at += (point[axis] - self.from[axis]) * self.along[axis];
-        }
-        let part = if self.length_squared > 0.0 { (at / self.length_squared).clamp(0.0, 1.0) } else { 0.0 };
-        let mut sum = 0.0;
-        for axis in 0..D {
-            let away = point[axis] - self.from[axis] - part * self.along[axis];
-            sum += away * away;
-        }
-        sum
+        let to = subtract(point, self.from);
+        let part = if self.length_squared > 0.0 { dot(to, self.along) / self.length_squared } else { 0.0 };
+        let away = subtract(to, self.along.map(|along| part.clamp(0.0, 1.0) * along));
+        dot(away, away)
     }
 }
 
