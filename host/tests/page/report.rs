@@ -361,7 +361,7 @@ pub(crate) fn faults_and_commands_are_marked() {
              return [Math.max(pixels(at - 1, ink(name)), pixels(at, ink(name))), pixels(at - 60, ink(name))]; }}); }})"
     ));
     for mark in places.as_array().expect("a list").iter().flat_map(|plot| plot.as_array().expect("two")) {
-        assert!(number(&mark[0]) > 20.0 && number(&mark[1]) < 10.0, "{places}");
+        assert!(number(&mark[0]) > 40.0 && 4.0 * number(&mark[1]) < number(&mark[0]), "{places}");
     }
     browser.close();
 }
