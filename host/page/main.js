@@ -11,8 +11,12 @@ import { Tables } from "page/tables.js";
 import { work } from "page/work.js";
 
 async function start(source) {
-  const runs = (await source()).runs.map(({ data, program }) => new Run(data, program));
-  if (runs.some((run) => run.ticks === 0)) return null;
+  let runs = (await source()).runs.map(({ data, program }) => new Run(data, program));
+  if (runs.length === 0 || runs[0].ticks === 0) return null;
+  for (const { header } of runs.slice(1).filter((run) => run.ticks === 0)) {
+    complain(`${header.program} is not shown: it holds no tick.`);
+  }
+  runs = runs.filter((run) => run.ticks > 0);
   for (const other of runs.slice(1)) other.matchAxes(runs[0]);
   const state = new State(runs);
   document.getElementById("workbench").hidden = false;
@@ -23,6 +27,13 @@ async function start(source) {
   tellResolution(state.run);
   state.place(0);
   return page;
+}
+
+/** Says what cannot be shown. */
+function complain(words) {
+  const problem = document.getElementById("problem");
+  problem.hidden = false;
+  problem.textContent = words;
 }
 
 /** Time or path, zoom, the whole run. */
@@ -75,8 +86,11 @@ function makeReadout(state, code) {
   const at = (name, unit) => {
     const quantity = run.quantity(name);
     const sample = run.sampleOf(state.cursor);
-    return quantity?.range(sample, sample + 1) ? `${span(quantity.low, quantity.high, 4)} ${unit}` : null;
+    return quantity?.range(sample, sample + 1) ? [quantity.low, quantity.high, unit] : null;
   };
+  const words = (found, digits = 4) => found && `${span(found[0], found[1], digits)} ${found[2]}`;
+  // Programs name feeds in mm/min.
+  const perMinute = (found) => found && `${words(found)} (${words([60 * found[0], 60 * found[1], "mm/min"])})`;
   const tell = () => {
     const { cursor } = state;
     const mm = run.pathMm(cursor);
@@ -88,9 +102,9 @@ function makeReadout(state, code) {
       `${fixed(run.timeS(cursor), 4)} s`,
       `${fixed(mm, 3)} mm`,
       line ? `${line} ${code.text(line)}`.trim() : null,
-      at("feed", "mm/s"),
+      perMinute(at("feed", "mm/s")),
       ceiling,
-      at("contour", "µm"),
+      words(at("contour", "µm"), 3),
       place.filter((text) => text !== null).join("  ") || null,
     ];
     fields.forEach(({ field, value }, i) => {
@@ -115,9 +129,7 @@ try {
   window.motion = await start(embedded);
   document.documentElement.dataset.state = "ready";
 } catch (error) {
-  const problem = document.getElementById("problem");
-  problem.hidden = false;
-  problem.textContent = `The page cannot show its data: ${error.message}`;
+  complain(`The page cannot show its data: ${error.message}`);
   document.documentElement.dataset.state = "failed";
   throw error;
 }

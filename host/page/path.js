@@ -13,6 +13,8 @@ const OFF_PX = 0.5;
 /** Length of a part of one colour [px]; while the view moves, longer ones do. */
 const PART_PX = 4;
 const PART_MOVING_PX = 16;
+/** How far parts of different colours overlap [px]: less than the distance that the path may be off. */
+const SEAM_PX = 0.4;
 /** Colours between slow and fast. */
 const SHADES = 32;
 /** Space around the path [px]. */
@@ -283,7 +285,11 @@ export class PathView {
       const number = isRapid ? "rapid" : Math.max(0, this.colour.classOf(from, to) || 0);
       if (!lines.has(number)) lines.set(number, new Path2D());
       const line = lines.get(number);
-      if (number !== last || x0 !== lastX || y0 !== lastY) line.moveTo(x0, y0);
+      if (number !== last || x0 !== lastX || y0 !== lastY) {
+        // A little into the part before, or the paper shows between them.
+        const overlap = SEAM_PX / Math.max(SEAM_PX, Math.hypot(x1 - x0, y1 - y0));
+        line.moveTo(x0 - (x1 - x0) * overlap, y0 - (y1 - y0) * overlap);
+      }
       line.lineTo(x1, y1);
       [last, lastX, lastY] = [number, x1, y1];
     });

@@ -107,6 +107,7 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
         ("--against", arguments.against.as_deref()),
     ]);
     let outputs = Outputs::open(&mut files, arguments.trace.as_ref(), arguments.report.as_ref())?;
+    input::differ("PROGRAM", &arguments.program, "--against", arguments.against.as_deref())?;
     let record = outputs::open(&mut files, "--record", arguments.record.as_ref())?;
     let kept = arguments.reading.parameters.as_ref();
     let kept = kept.map(|path| files.edited("--parameters", path, "--parameters")).transpose()?;
