@@ -16,6 +16,8 @@ const CEILING_TO_FEED = 1.3;
 const RANGE_ALPHA = 0.6;
 /** Height of a word above the feed [px]. */
 const WORD_PX = 14;
+/** How much the curves of another run stand out. */
+const OTHER_ALPHA = 0.45;
 /** Width of a curve [px]. */
 const CURVE_WIDTH = 1.4;
 
@@ -145,12 +147,22 @@ export class Plot {
         const ticks = edges[number];
         const perColumn = (ticks[count] - ticks[0]) / count / run.ticksPerSample;
         const points = [];
+        // Where pieces of the curve begin: it has gaps where ticks are missing.
+        const starts = [];
+        let isGap = true;
+        const add = (px, isKnown) => {
+          work.columns += 1;
+          if (isKnown) {
+            if (isGap) starts.push(points.length);
+            points.push([px, quantity.low, quantity.high]);
+          }
+          isGap = !isKnown;
+        };
         if (run.ticksPerSample === 1 && perColumn < 1) {
           const first = Math.max(0, Math.floor(ticks[0]) - 1);
           const last = Math.min(run.ticks - 1, Math.ceil(ticks[count]) + 1);
           for (let tick = first; tick <= last; tick += 1) {
-            work.columns += 1;
-            if (quantity.range(tick, tick + 1)) points.push([this.px(this.state.xOf(run, tick)), quantity.low, quantity.high]);
+            add(this.px(this.state.xOf(run, tick)), quantity.range(tick, tick + 1));
           }
         } else {
           for (let i = 0; i < count; i += 1) {
@@ -160,13 +172,10 @@ export class Plot {
             if (this.state.over === "path" && ticks[i] === ticks[i + 1] && ticks[i] === run.ticks - 1) continue;
             const from = run.sampleOf(ticks[i]);
             const to = Math.max(from + 1, Math.ceil(Math.min(run.ticks, ticks[i + 1]) / run.ticksPerSample));
-            work.columns += 1;
-            if (quantity.range(from, Math.min(run.samples, to))) {
-              points.push([MARGIN.left + (i + 0.5) / this.scale, quantity.low, quantity.high]);
-            }
+            add(MARGIN.left + (i + 0.5) / this.scale, quantity.range(from, Math.min(run.samples, to)));
           }
         }
-        shapes.push({ curve, points, isOther: number > 0 });
+        shapes.push({ curve, points, starts, isOther: number > 0 });
       }
     });
     return shapes;
@@ -334,14 +343,20 @@ export class Plot {
     this.legend.replaceChildren(...keys);
   }
 
-  drawShape(context, { curve, points, isOther }) {
-    if (points.length === 0) return;
+  drawShape(context, { curve, points, starts, isOther }) {
     context.strokeStyle = ink(curve.ink);
     context.fillStyle = ink(curve.ink);
-    context.globalAlpha = isOther ? 0.45 : 1;
+    context.globalAlpha = isOther ? OTHER_ALPHA : 1;
     context.lineWidth = CURVE_WIDTH;
     context.lineJoin = "round";
     if (isOther) context.setLineDash([4, 3]);
+    starts.forEach((start, i) => this.drawPiece(context, points.slice(start, starts[i + 1])));
+    context.setLineDash([]);
+    context.globalAlpha = 1;
+  }
+
+  /** A piece of a curve: a line, or the range between two, or a dot. */
+  drawPiece(context, points) {
     context.beginPath();
     points.forEach(([x, , high], i) => (i ? context.lineTo(x, this.py(high)) : context.moveTo(x, this.py(high))));
     if (points.some(([, low, high]) => low !== high)) {
@@ -352,13 +367,10 @@ export class Plot {
       context.globalAlpha /= RANGE_ALPHA;
     }
     context.stroke();
-    context.setLineDash([]);
-    if (points.length === 1) {
-      context.beginPath();
-      context.arc(points[0][0], this.py(points[0][2]), 2, 0, 7);
-      context.fill();
-    }
-    context.globalAlpha = 1;
+    if (points.length > 1) return;
+    context.beginPath();
+    context.arc(points[0][0], this.py(points[0][2]), 2, 0, 7);
+    context.fill();
   }
 
   /** Faults and commands. */

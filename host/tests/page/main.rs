@@ -4,7 +4,7 @@
 //! `CI=true`. Work is counted, and no clock is read.
 
 mod browser;
-mod long;
+mod made_up;
 mod report;
 #[allow(dead_code, reason = "the suite uses the rest of it")]
 #[path = "../cli/workspace.rs"]
@@ -14,9 +14,10 @@ use std::process::ExitCode;
 
 use libtest_mimic::{Arguments, Failed, Trial};
 
-const TESTS: [(&str, fn()); 11] = [
-    ("a_long_run_is_told_in_samples", long::a_long_run_is_told_in_samples),
-    ("pyramids_neither_lose_nor_invent_peaks", long::pyramids_neither_lose_nor_invent_peaks),
+const TESTS: [(&str, fn()); 12] = [
+    ("a_long_run_is_told_in_samples", made_up::a_long_run_is_told_in_samples),
+    ("pyramids_neither_lose_nor_invent_peaks", made_up::pyramids_neither_lose_nor_invent_peaks),
+    ("late_logs_with_gaps_and_rotary_axes_are_shown", made_up::late_logs_with_gaps_and_rotary_axes_are_shown),
     ("figures_are_those_of_the_run", report::figures_are_those_of_the_run),
     ("the_cursor_is_dragged", report::the_cursor_is_dragged),
     ("the_wheel_zooms", report::the_wheel_zooms),

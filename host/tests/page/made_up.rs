@@ -1,4 +1,4 @@
-//! A run of ten minutes, of which the page has samples of several ticks.
+//! Runs that are made up: one of ten minutes, of which the page has samples of several ticks; a log with gaps.
 
 use motion_host::gcode::Axis;
 use motion_host::report;
@@ -166,5 +166,52 @@ pub(crate) fn pyramids_neither_lose_nor_invent_peaks() {
         ));
         assert_eq!(wrong, json!([]), "{count} numbers");
     }
+    browser.close();
+}
+
+/// As a board's log has it: it begins late, ticks are missing, no block is known; and an axis that turns.
+pub(crate) fn late_logs_with_gaps_and_rotary_axes_are_shown() {
+    let workspace = Workspace::new("page-log");
+    let mut log = trace();
+    log.blocks.clear();
+    log.axes.truncate(2);
+    log.axes[1] = TracedAxis { name: "A".to_owned(), letter: Axis::A, ..log.axes[1].clone() };
+    let of_log = |row: &TraceRow| (4_700..6_000).contains(&row.tick) && !(5_200..5_300).contains(&row.tick);
+    log.ticks.retain(of_log);
+    let mut page = Vec::new();
+    report::write_html(&log, None, &mut page).expect("memory");
+    workspace.put("log.html", &String::from_utf8(page).expect("UTF-8"));
+    let browser = Browser::open(&workspace.0.join("log.html"), [1400, 1000]);
+    assert_eq!(browser.number("motion.run.ticks"), 1_300.0);
+    // Over time it begins where the log does.
+    assert!((browser.number("motion.state.from") - 4_700.0 * TICK_S).abs() < 1e-9);
+    for (tick, line) in [(4_700, "1"), (4_999, "1"), (5_000, "2"), (5_999, "2")] {
+        browser.run(&format!("motion.state.place({tick} - motion.run.firstTick)"));
+        let told = browser.after_frame("document.getElementById('readout').textContent");
+        let told = told.as_str().expect("text");
+        assert!(told.contains(&format!("{:.4} s", f64::from(tick) * TICK_S)), "{tick}: {told}");
+        assert!(told.contains(&format!("Line{line}")), "{tick}: {told}");
+    }
+    // Nothing is told of what is missing.
+    browser.run("motion.state.place(550)");
+    let value = browser.after_frame("motion.plots.plots[0].values.querySelector('output').textContent");
+    assert_eq!(value, "–");
+    let gap = browser.after_frame(
+        "(() => { const plot = motion.plots.plots[0]; const { points, starts } = plot.shapes(motion.plots.columns())[0]; \
+         return [points.every(([x, low, high]) => Number.isFinite(low + high)), starts.length, \
+           ...[starts[1] - 1, starts[1]].map((i) => motion.run.tickAtTime(plot.xAt(points[i][0])))]; })()",
+    );
+    assert_eq!((&gap[0], &gap[1]), (&json!(true), &json!(2)), "{gap}");
+    for (at, tick) in [(2, 500.0), (3, 600.0)] {
+        assert!((gap[at].as_f64().expect("a tick") - tick).abs() <= 3.0, "{gap}");
+    }
+    // Axes of two units have plots of their own; errors of the rotary one are in thousandths of a degree.
+    let plots =
+        browser.run("return motion.plots.plots.map((plot) => plot.title + ' ' + plot.unit)").to_string();
+    for plot in ["Following error µm", "Following error m°", "Position °", "Velocity °/s", "Output V"] {
+        assert!(plots.contains(plot), "{plot}: {plots}");
+    }
+    browser.run("motion.state.layOver('path')");
+    browser.after_frame("0");
     browser.close();
 }
