@@ -1,4 +1,6 @@
 // Makes the page from the runs of a source.
+//
+// source ─► data ─► run ─► state: one cursor, one window ─► plots, path, code, tables
 
 import { Code } from "page/code.js";
 import { figure, fixed, span } from "page/format.js";

@@ -3,26 +3,21 @@
 // What is drawn are the corners of the coarsest picture that is within half a pixel of the path. A straight part between two
 // corners may be driven at many feeds, so it is drawn in parts of some pixels, each with its own colour.
 
+import { Camera } from "page/camera.js";
+import { coloursOf } from "page/colours.js";
 import { figure, marks, roundStep } from "page/format.js";
-import { Sheet } from "page/plot.js";
-import { dashes, ink, onChange, shade } from "page/theme.js";
+import { listen } from "page/path-input.js";
+import { Sheet } from "page/sheet.js";
+import { ink, onChange, shade } from "page/theme.js";
 import { nextFrame, work } from "page/work.js";
 
-/** The greatest distance of the drawn path from the true one, in pixels of the screen. */
-const OFF_PX = 0.5;
 /** Length of a part of one colour [px]; while the view moves, longer ones do. */
 const PART_PX = 4;
 const PART_MOVING_PX = 16;
 /** How far parts of different colours overlap [px]: less than the distance that the path may be off. */
 const SEAM_PX = 0.4;
-/** Colours between slow and fast. */
-const SHADES = 32;
-/** Space around the path [px]. */
-const AIR_PX = 28;
 /** A pointer finds the path from this near [px]. */
 const NEAR_PX = 14;
-/** The feed that is at its ceiling: plans keep off by less. */
-const AT_CEILING = 0.999;
 /** Exaggerations of the error. */
 const FACTORS = [0, 10, 30, 100, 300, 1000, 3000, 10000];
 
@@ -39,75 +34,22 @@ export class PathView {
     this.sheet = new Sheet(this.stage);
     this.dot = this.stage.appendChild(document.createElement("i"));
     this.dot.className = "dot";
-    this.colours = this.choices();
+    this.colours = coloursOf(state.run);
     this.colour = this.colours[0];
     this.factor = 0;
     this.view = views[0];
+    this.camera = new Camera(state.runs);
     this.makeTools(views);
     this.fit();
-    this.listen();
+    listen(this);
     this.redraw = () => this.draw();
     state.on("cursor", () => nextFrame(() => this.place()));
     new ResizeObserver(() => {
-      if (!this.isMoved) this.fit();
+      if (!this.camera.isMoved) this.fit();
       nextFrame(this.redraw);
     }).observe(this.stage);
     onChange(() => this.draw());
     nextFrame(this.redraw);
-  }
-
-  /** What the path may be coloured by: a name, and its class for ticks of a run, with what the classes mean. */
-  choices() {
-    const { run } = this.state;
-    const { blocks } = run;
-    const greatest = (values, isOf) => values.reduce((most, value, i) => (isOf(i) && value > most ? value : most), 0);
-    const feed = run.quantity("feed");
-    const cutting = greatest(blocks.peak, (i) => !blocks.isRapid[i]);
-    const scale = (name, unit, words, most, value) => ({
-      name,
-      classOf: (from, to) => Math.min(SHADES - 1, Math.floor((value(from, to) / most) * SHADES)),
-      inkOf: (number) => shade((number + 0.5) / SHADES),
-      legend: () => [{ isScale: true, from: "0", to: `${figure(most, 3)} ${unit}` }],
-      words,
-    });
-    const whole = feed.range(0, run.samples) ? feed.high : 1;
-    const samples = (from, to) => [run.sampleOf(from), Math.max(run.sampleOf(from) + 1, run.sampleOf(to))];
-    const list = [
-      scale("Feed", "mm/s", "Lowest feed of each part.", cutting || whole || 1, (from, to) => {
-        feed.range(...samples(from, to));
-        return feed.low;
-      }),
-    ];
-    if (blocks.count) {
-      const { reasons } = run.header;
-      const changing = reasons.length;
-      list.push({
-        name: "Limit",
-        classOf: (from, to) => {
-          const block = run.blockAt(run.pathMm((from + to) / 2));
-          feed.range(...samples(from, to));
-          const isAt = feed.high >= AT_CEILING * blocks.ceiling[block];
-          return isAt && reasons[blocks.reason[block]][1] !== "unreached" ? blocks.reason[block] : changing;
-        },
-        inkOf: (number) => ink(number === changing ? "unreached" : reasons[number][1]),
-        legend: () => [
-          ...reasons.filter(([, of]) => of !== "unreached").map(([name, of]) => ({ ink: of, name })),
-          { ink: "unreached", name: "feed changes" },
-        ],
-        words: "What holds the feed down: a ceiling, or the way to the next one.",
-      });
-    }
-    const errors = (name, columns, words) => {
-      const quantities = columns.map((column) => run.quantity(column)).filter(Boolean);
-      const value = (from, to) => quantities.reduce((most, quantity) =>
-        quantity.range(...samples(from, to)) ? Math.max(most, -quantity.low, quantity.high) : most, 0);
-      const most = value(0, run.ticks);
-      if (quantities.length && most > 0) list.push(scale(name, "µm", words, most, value));
-    };
-    const axes = run.header.axes.map((axis, i) => ({ ...axis, i })).filter((axis) => axis.is_on_path);
-    errors("Following error", axes.map((axis) => `error ${axis.i}`), "Greatest following error of an axis in each part.");
-    errors("Contour error", ["contour"], "Greatest contour error of each part.");
-    return list;
   }
 
   makeTools(views) {
@@ -155,51 +97,13 @@ export class PathView {
     whole.addEventListener("click", () => this.showAll());
   }
 
+  fit() {
+    this.camera.fit(this.view[1], [this.stage.clientWidth, this.stage.clientHeight]);
+  }
+
   showAll() {
     this.fit();
     nextFrame(this.redraw);
-  }
-
-  get isInSpace() {
-    return this.view[1].length === 3;
-  }
-
-  /** Directions on the screen, to the right and downwards, of the view's axes. */
-  directions() {
-    if (!this.isInSpace) return [[1, 0], [0, -1]];
-    const [sy, cy, sp, cp] = [Math.sin(this.yaw), Math.cos(this.yaw), Math.sin(this.pitch), Math.cos(this.pitch)];
-    return [[cy, sy * sp], [sy, -cy * sp], [0, -cp]];
-  }
-
-  /** Sees the whole path. */
-  fit() {
-    // From the front, the right and above.
-    if (!this.isMoved || !this.isInSpace) [this.yaw, this.pitch] = [-0.6, 0.6];
-    this.isMoved = false;
-    const axes = this.view[1];
-    const spans = axes.map((axis) => {
-      const all = this.state.runs.flatMap((run) => {
-        const values = run.outline.places[axis];
-        return values ? [values.reduce((a, b) => Math.min(a, b), Infinity), values.reduce((a, b) => Math.max(a, b), -Infinity)] : [];
-      });
-      return [Math.min(...all), Math.max(...all)];
-    });
-    this.pivot = spans.map(([low, high]) => (low + high) / 2);
-    this.offset = [0, 0];
-    const directions = this.directions();
-    const size = [0, 1].map((way) =>
-      directions.reduce((sum, direction, i) => sum + Math.abs(direction[way]) * (spans[i][1] - spans[i][0]), 0));
-    const [width, height] = [this.stage.clientWidth, this.stage.clientHeight];
-    const [w, h] = [width - 2 * AIR_PX, height - 2 * AIR_PX];
-    const scale = Math.min(w / (size[0] || 1e-9), h / (size[1] || 1e-9));
-    // A point has no size; it gets a millimetre.
-    this.scale = this.limited(size[0] || size[1] ? scale : Math.min(w, h));
-  }
-
-  /** Pixels to a millimetre: no more than the data resolve. */
-  limited(scale) {
-    const ratio = window.devicePixelRatio || 1;
-    return Math.min(scale, OFF_PX / (this.state.run.outline.toleranceMm * ratio));
   }
 
   /** Draws all. While the view moves, coarser colours do. */
@@ -209,20 +113,10 @@ export class PathView {
     if (width < 10) return;
     const { context } = this.sheet;
     const { state } = this;
-    this.size = [width, height];
-    const directions = this.directions();
-    const axes = this.view[1];
-    this.project = (place) => {
-      let [x, y] = [width / 2 + this.offset[0], height / 2 + this.offset[1]];
-      for (let i = 0; i < axes.length; i += 1) {
-        const mm = (place[axes[i]] - this.pivot[i]) * this.scale;
-        x += directions[i][0] * mm;
-        y += directions[i][1] * mm;
-      }
-      return [x, y];
-    };
-    if (this.isInSpace) this.drawTriad(context, directions, axes);
-    else this.drawGrid(context, axes);
+    this.camera.size = [width, height];
+    this.project = this.camera.projection();
+    if (this.camera.isInSpace) this.drawTriad(context);
+    else this.drawGrid(context);
     this.parts = [];
     for (const run of state.runs.slice(1)) this.drawPlain(context, run, "axis", 0);
     this.drawColoured(context, isMoving ? PART_MOVING_PX : PART_PX);
@@ -238,9 +132,8 @@ export class PathView {
   /** Calls `part` with ends on the screen and ticks of every part of the path that may be seen, in order. */
   walk(run, partPx, part) {
     const { outline } = run;
-    const ratio = window.devicePixelRatio || 1;
-    const corners = outline.within(OFF_PX / ratio / this.scale);
-    const axes = this.view[1];
+    const { axes, size: [width, height] } = this.camera;
+    const corners = outline.within(this.camera.toleranceMm);
     // Another machine may lack an axis.
     if (corners.length === 0 || axes.some((axis) => outline.places[axis] === null)) return;
     const place = [];
@@ -248,7 +141,6 @@ export class PathView {
       for (const axis of axes) place[axis] = outline.places[axis][i];
       return this.project(place);
     };
-    const [width, height] = this.size;
     let from = at(corners[0]);
     for (let n = 1; n < corners.length; n += 1) {
       const [i, j] = [corners[n - 1], corners[n]];
@@ -315,16 +207,16 @@ export class PathView {
 
   /** A path in one colour; the actual one with its error times `factor`, or the set one. */
   drawPlain(context, run, name, factor) {
-    const axes = this.view[1];
+    const { axes, scale } = this.camera;
     const errors = axes.map((axis) => run.quantity(`error ${axis}`));
-    const directions = this.directions();
+    const directions = this.camera.directions();
     const off = (tick) => {
       let [dx, dy] = [0, 0];
       const sample = run.sampleOf(tick);
       errors.forEach((error, i) => {
         if (!factor || !error?.range(sample, sample + 1)) return;
         // Set minus actual; a sample of several ticks is drawn in the middle of its range.
-        const px = ((error.low + error.high) / -2) * 1e-3 * factor * this.scale;
+        const px = ((error.low + error.high) / -2) * 1e-3 * factor * scale;
         dx += directions[i][0] * px;
         dy += directions[i][1] * px;
       });
@@ -347,19 +239,19 @@ export class PathView {
   }
 
   /** Round places of the plane, and their coordinates. */
-  drawGrid(context, axes) {
-    const [width, height] = this.size;
+  drawGrid(context) {
+    const { axes, pivot, offset, scale, size: [width, height] } = this.camera;
     const { header } = this.state.run;
-    const low = [this.pivot[0] - (width / 2 + this.offset[0]) / this.scale, this.pivot[1] - (height / 2 - this.offset[1]) / this.scale];
-    const high = [low[0] + width / this.scale, low[1] + height / this.scale];
+    const low = [pivot[0] - (width / 2 + offset[0]) / scale, pivot[1] - (height / 2 - offset[1]) / scale];
+    const high = [low[0] + width / scale, low[1] + height / scale];
     const text = (value, decimals) => (Math.abs(value) < 1e-9 ? "0" : value.toFixed(decimals).replace("-", "−"));
     context.lineWidth = 1;
     context.strokeStyle = ink("grid");
-    const step = roundStep(width / this.scale, width / 80);
+    const step = roundStep(width / scale, width / 80);
     for (const [way, size] of [[0, width], [1, height]]) {
       const { values, decimals } = marks(low[way], high[way], (high[way] - low[way]) / step);
       for (const value of values) {
-        const px = way === 0 ? (value - low[0]) * this.scale : height - (value - low[1]) * this.scale;
+        const px = way === 0 ? (value - low[0]) * scale : height - (value - low[1]) * scale;
         const at = Math.round(px) + 0.5;
         context.beginPath();
         context.moveTo(way ? 0 : at, way ? at : 0);
@@ -381,8 +273,9 @@ export class PathView {
   }
 
   /** Where the axes point, and how long a round length is. */
-  drawTriad(context, directions, axes) {
-    const [, height] = this.size;
+  drawTriad(context) {
+    const { axes, scale, size: [width, height] } = this.camera;
+    const directions = this.camera.directions();
     const { header } = this.state.run;
     const [x, y, length] = [42, height - 42, 28];
     context.lineWidth = 1.5;
@@ -398,10 +291,10 @@ export class PathView {
       context.fillStyle = ink("text");
       context.fillText(header.axes[axis].name, x + (length + 9) * dx, y + (length + 9) * dy);
     });
-    const bar = roundStep(90 / this.scale, 1);
-    const long = Math.min(bar, bar / Math.ceil((bar * this.scale) / 160)) * this.scale;
-    const mm = long / this.scale;
-    const right = this.size[0] - 14;
+    const bar = roundStep(90 / scale, 1);
+    const long = Math.min(bar, bar / Math.ceil((bar * scale) / 160)) * scale;
+    const mm = long / scale;
+    const right = width - 14;
     context.strokeStyle = ink("axis");
     context.beginPath();
     context.moveTo(right - long, height - 20);
@@ -472,7 +365,8 @@ export class PathView {
     if (!this.project) return;
     const { run, cursor } = this.state;
     const [x, y] = this.project(run.placeAt(cursor));
-    this.dot.hidden = !(x > -6 && y > -6 && x < this.size[0] + 6 && y < this.size[1] + 6);
+    const [width, height] = this.camera.size;
+    this.dot.hidden = !(x > -6 && y > -6 && x < width + 6 && y < height + 6);
     if (!this.dot.hidden) this.dot.style.transform = `translate(${x}px,${y}px)`;
   }
 
@@ -491,108 +385,9 @@ export class PathView {
     return tick;
   }
 
-  zoom(x, y, factor) {
-    const scale = this.limited(this.scale * factor);
-    const by = scale / this.scale;
-    const [width, height] = this.size;
-    // What is under the pointer stays there.
-    this.offset[0] = x - width / 2 - (x - width / 2 - this.offset[0]) * by;
-    this.offset[1] = y - height / 2 - (y - height / 2 - this.offset[1]) * by;
-    this.scale = scale;
-    this.move();
-  }
-
+  /** Draws what the camera sees now, in full when it has come to rest. */
   move() {
-    this.isMoved = true;
     this.redrawMoving ??= () => this.draw(true);
     nextFrame(this.redrawMoving);
-  }
-
-  listen() {
-    const { stage, state } = this;
-    const fingers = new Map();
-    let drag = null;
-    const at = (event) => {
-      const box = stage.getBoundingClientRect();
-      return [event.clientX - box.left, event.clientY - box.top];
-    };
-    const centre = () => {
-      const all = [...fingers.values()];
-      const mean = (way) => all.reduce((sum, place) => sum + place[way], 0) / all.length;
-      return { x: mean(0), y: mean(1), spread: all.length > 1 ? Math.hypot(all[0][0] - all[1][0], all[0][1] - all[1][1]) : 0 };
-    };
-    stage.addEventListener("pointerdown", (event) => {
-      stage.setPointerCapture(event.pointerId);
-      fingers.set(event.pointerId, at(event));
-      const turns = this.isInSpace && fingers.size === 1 && event.button === 0 && !event.shiftKey;
-      drag = { ...centre(), turns, far: 0 };
-    });
-    stage.addEventListener("pointermove", (event) => {
-      if (!drag) {
-        const tick = event.pointerType === "mouse" ? this.tickNear(...at(event)) : undefined;
-        if (tick === undefined) state.leave();
-        else state.hover(tick);
-        return;
-      }
-      if (!fingers.has(event.pointerId)) return;
-      fingers.set(event.pointerId, at(event));
-      const now = centre();
-      const [dx, dy] = [now.x - drag.x, now.y - drag.y];
-      drag.far += Math.abs(dx) + Math.abs(dy);
-      if (drag.turns) {
-        this.yaw += dx / 150;
-        this.pitch = Math.min(Math.PI / 2, Math.max(-Math.PI / 2, this.pitch + dy / 150));
-      } else {
-        this.offset[0] += dx;
-        this.offset[1] += dy;
-        if (drag.spread && now.spread) this.zoom(now.x, now.y, now.spread / drag.spread);
-      }
-      Object.assign(drag, now);
-      if (drag.far > 3) this.move();
-    });
-    const end = (event) => {
-      // A pointer that stayed where it was points at the path.
-      if (drag && drag.far <= 3 && fingers.size === 1) {
-        const tick = this.tickNear(...at(event));
-        if (tick !== undefined) state.visit(tick);
-      }
-      fingers.delete(event.pointerId);
-      drag = fingers.size ? { ...centre(), turns: false, far: 99 } : null;
-    };
-    stage.addEventListener("pointerup", end);
-    stage.addEventListener("pointercancel", end);
-    stage.addEventListener("pointerleave", () => drag || state.leave());
-    stage.addEventListener("contextmenu", (event) => event.preventDefault());
-    stage.addEventListener("dblclick", () => this.showAll());
-    stage.addEventListener("wheel", (event) => {
-      event.preventDefault();
-      this.zoom(...at(event), 2 ** (-event.deltaY / 300));
-    }, { passive: false });
-    stage.addEventListener("keydown", (event) => {
-      const [w, h] = this.size;
-      const turn = (yaw, pitch) => {
-        if (this.isInSpace) {
-          this.yaw += yaw;
-          this.pitch = Math.min(Math.PI / 2, Math.max(-Math.PI / 2, this.pitch + pitch));
-        } else {
-          this.offset[0] -= yaw * 200;
-          this.offset[1] -= pitch * 200;
-        }
-        this.move();
-      };
-      const actions = {
-        "+": () => this.zoom(w / 2, h / 2, 1.5),
-        "=": () => this.zoom(w / 2, h / 2, 1.5),
-        "-": () => this.zoom(w / 2, h / 2, 1 / 1.5),
-        0: () => this.showAll(),
-        ArrowLeft: () => turn(-0.1, 0),
-        ArrowRight: () => turn(0.1, 0),
-        ArrowUp: () => turn(0, -0.1),
-        ArrowDown: () => turn(0, 0.1),
-      };
-      if (!(event.key in actions) || event.ctrlKey || event.metaKey || event.altKey) return;
-      actions[event.key]();
-      event.preventDefault();
-    });
   }
 }

@@ -1,13 +1,10 @@
-// One pair of axes with curves, on canvas.
-//
-// A column of pixels shows the lowest and the highest value of the ticks it spans. Where a tick is wider than a column, the
-// curve goes straight from tick to tick.
+// One pair of axes with curves, on canvas, with the values at the cursor above it.
 
+import { MARGIN } from "page/columns.js";
 import { figure, fixed, marks, roundStep } from "page/format.js";
+import { Sheet } from "page/sheet.js";
 import { dashes, ink } from "page/theme.js";
-import { work } from "page/work.js";
 
-export const MARGIN = { left: 66, right: 10, top: 6, bottom: 20 };
 /** The part of its limit from which on a plot shows the limit; below it the curve would be flat. */
 const LIMIT_SHOWN_FROM = 0.2;
 /** How far above the highest feed a ceiling is drawn. */
@@ -20,51 +17,6 @@ const WORD_PX = 14;
 const OTHER_ALPHA = 0.45;
 /** Width of a curve [px]. */
 const CURVE_WIDTH = 1.4;
-
-/** The page's, for what is drawn. */
-let font;
-
-/** A canvas that fills its element at the screen's resolution. */
-export class Sheet {
-  constructor(parent) {
-    this.canvas = parent.appendChild(document.createElement("canvas"));
-    this.context = this.canvas.getContext("2d");
-  }
-
-  /** Looks how large it is. What was written into the page before is laid out for it, so sheets are measured together. */
-  measure() {
-    this.width = this.canvas.clientWidth;
-    this.height = this.canvas.clientHeight;
-    font ??= `12px ${getComputedStyle(document.body).fontFamily}`;
-  }
-
-  /** Empties it; its size in CSS pixels. */
-  clear() {
-    const scale = window.devicePixelRatio || 1;
-    const { width, height } = this;
-    const [w, h] = [Math.round(width * scale), Math.round(height * scale)];
-    if (this.canvas.width !== w || this.canvas.height !== h) [this.canvas.width, this.canvas.height] = [w, h];
-    this.context.setTransform(scale, 0, 0, scale, 0, 0);
-    this.context.clearRect(0, 0, width, height);
-    this.context.font = font;
-    return { width, height, scale };
-  }
-}
-
-/** The ticks that the columns of a window begin at, for every run: all plots share them. */
-export function columnsOf(state, width, scale) {
-  const count = Math.max(1, Math.round(width * scale));
-  const edges = state.runs.map((run) => {
-    const ticks = new Float64Array(count + 1);
-    for (let i = 0; i <= count; i += 1) {
-      const x = state.from + ((state.to - state.from) * i) / count;
-      const tick = state.over === "time" ? x / run.tickS - run.firstTick : run.tickAtPath(x);
-      ticks[i] = tick;
-    }
-    return ticks;
-  });
-  return { count, edges };
-}
 
 export class Plot {
   /**
@@ -119,7 +71,7 @@ export class Plot {
     if (this.width < 10 || this.height < 10) return;
     this.scale = scale;
     const shapes = this.shapes(columns);
-    const ceilings = this.hasCeilings ? this.ceilings(columns) : [];
+    const ceilings = this.hasCeilings ? columns.ceilings() : [];
     this.fit(shapes, ceilings);
     const { context } = this.sheet;
     this.drawRests(context);
@@ -137,76 +89,12 @@ export class Plot {
     this.place();
   }
 
-  /** The lowest and the highest value in each column, for every curve of every run. */
-  shapes({ count, edges }) {
-    const shapes = [];
-    this.state.runs.forEach((run, number) => {
-      for (const curve of this.curves) {
-        const quantity = run.quantity(curve.column);
-        if (!quantity) continue;
-        const ticks = edges[number];
-        const perColumn = (ticks[count] - ticks[0]) / count / run.ticksPerSample;
-        const points = [];
-        // Where pieces of the curve begin: it has gaps where ticks are missing.
-        const starts = [];
-        let isGap = true;
-        const add = (px, isKnown) => {
-          work.columns += 1;
-          if (isKnown) {
-            if (isGap) starts.push(points.length);
-            points.push([px, quantity.low, quantity.high]);
-          }
-          isGap = !isKnown;
-        };
-        if (run.ticksPerSample === 1 && perColumn < 1) {
-          const first = Math.max(0, Math.floor(ticks[0]) - 1);
-          const last = Math.min(run.ticks - 1, Math.ceil(ticks[count]) + 1);
-          for (let tick = first; tick <= last; tick += 1) {
-            add(this.px(this.state.xOf(run, tick)), quantity.range(tick, tick + 1));
-          }
-        } else {
-          for (let i = 0; i < count; i += 1) {
-            // Before the run and behind its end there is nothing.
-            if (ticks[i + 1] < 0 || ticks[i] > run.ticks - 1) continue;
-            // Nor behind the end of its path, where every position has its last tick.
-            if (this.state.over === "path" && ticks[i] === ticks[i + 1] && ticks[i] === run.ticks - 1) continue;
-            const from = run.sampleOf(ticks[i]);
-            const to = Math.max(from + 1, Math.ceil(Math.min(run.ticks, ticks[i + 1]) / run.ticksPerSample));
-            add(MARGIN.left + (i + 0.5) / this.scale, quantity.range(from, Math.min(run.samples, to)));
-          }
-        }
-        shapes.push({ curve, points, starts, isOther: number > 0 });
-      }
-    });
-    return shapes;
-  }
-
-  /** Ceilings by column: their lowest, with its reason, and their highest. */
-  ceilings({ count, edges }) {
-    const [run] = this.state.runs;
-    const steps = [];
-    if (run.blocks.count === 0) return steps;
-    const ticks = edges[0];
-    let before = -1;
-    for (let i = 0; i < count; i += 1) {
-      if (ticks[i + 1] < 0 || ticks[i] > run.ticks - 1) continue;
-      const isPath = this.state.over === "path";
-      const span = this.state.to - this.state.from;
-      const at = (edge) => (isPath ? this.state.from + (span * edge) / count : run.pathMm(ticks[edge]));
-      const first = run.blockAt(at(i));
-      const last = Math.max(first, run.blockAt(at(i + 1)));
-      const px = MARGIN.left + i / this.scale;
-      if (first === last && first === before) {
-        steps.at(-1).to = px + 1 / this.scale;
-        continue;
-      }
-      before = first === last ? first : -1;
-      run.ceilings.range(first, last + 1);
-      const [low, high] = [run.ceilings.low * run.ceilingStep, run.ceilings.high * run.ceilingStep];
-      const reason = run.reasonOf(run.ceilings.lowest(first, last + 1));
-      steps.push({ from: px, to: px + 1 / this.scale, low, high, reason });
-    }
-    return steps;
+  /** What is to be drawn of every curve of every run, the page's own first. */
+  shapes(columns) {
+    return this.state.runs.flatMap((run, number) => this.curves.flatMap((curve) => {
+      const found = columns.curve(number, curve.column);
+      return found ? [{ ...found, curve, isOther: number > 0 }] : [];
+    }));
   }
 
   /** The ends of the vertical axis: all that is in the window, and zero. */

@@ -1,16 +1,14 @@
 // The plots one above the other, with their common window, and what pointers, wheels and keys do to it.
 
-import { Plot, MARGIN, Sheet, columnsOf } from "page/plot.js";
-import { ink, onChange } from "page/theme.js";
-import { nextFrame, work } from "page/work.js";
+import { Columns, MARGIN } from "page/columns.js";
+import { Overview } from "page/overview.js";
+import { Plot } from "page/plot.js";
+import { wheelFactor } from "page/state.js";
+import { onChange } from "page/theme.js";
+import { nextFrame } from "page/work.js";
 
 /** Time after a scroll of the page in which the wheel goes on scrolling it [ms]. */
 const SCROLL_GOES_ON_MS = 350;
-/** Zoom of a notch of the wheel, as a power of 2. */
-const ZOOM_PER_NOTCH = 0.35;
-/** Pixels of a notch. */
-const NOTCH_PX = 100;
-
 /** What there is to be drawn of a run. */
 function plotsOf(run) {
   const { axes, limits } = run.header;
@@ -89,7 +87,7 @@ export class Plots {
   /** The columns of the window, which all plots have. */
   columns() {
     const width = this.plots[0].area.clientWidth - MARGIN.left - MARGIN.right;
-    return columnsOf(this.state, width, window.devicePixelRatio || 1);
+    return new Columns(this.state, width, window.devicePixelRatio || 1);
   }
 
   /** Draws what is old and seen. */
@@ -177,7 +175,7 @@ export class Plots {
     }
     event.preventDefault();
     if (Math.abs(dx) > Math.abs(dy)) state.pan(dx / 800);
-    else state.zoom(x, 2 ** ((ZOOM_PER_NOTCH * dy) / NOTCH_PX));
+    else state.zoom(x, wheelFactor(dy));
   }
 
   key(event) {
@@ -218,84 +216,3 @@ const middle = (fingers) => {
   const [a, b] = fingers.values();
   return (a + b) / 2;
 };
-
-/** The feed of the whole run, with the window of the plots on it. */
-class Overview {
-  constructor(state, element) {
-    this.state = state;
-    this.element = element;
-    this.sheet = new Sheet(element);
-    this.window = element.appendChild(document.createElement("i"));
-    this.window.className = "window";
-    this.line = element.appendChild(document.createElement("i"));
-    this.line.className = "cursor";
-    this.isOld = true;
-    let grip = null;
-    const at = (event) => {
-      const [from, to] = state.ends();
-      const part = (event.clientX - element.getBoundingClientRect().left - MARGIN.left) / this.width;
-      return from + part * (to - from);
-    };
-    element.addEventListener("pointerdown", (event) => {
-      element.setPointerCapture(event.pointerId);
-      const x = at(event);
-      const half = (state.to - state.from) / 2;
-      // What is not taken hold of comes to where the pointer is.
-      if (x < state.from || x > state.to) state.show(x - half, x + half);
-      grip = x - state.from;
-    });
-    element.addEventListener("pointermove", (event) => {
-      if (grip === null) return;
-      const width = state.to - state.from;
-      const from = at(event) - grip;
-      state.show(from, from + width);
-    });
-    for (const end of ["pointerup", "pointercancel"]) element.addEventListener(end, () => (grip = null));
-    element.addEventListener("wheel", (event) => {
-      event.preventDefault();
-      state.zoom(at(event), 2 ** ((ZOOM_PER_NOTCH * event.deltaY) / NOTCH_PX));
-    }, { passive: false });
-  }
-
-  draw() {
-    const { state } = this;
-    if (this.over !== state.over) this.isOld = true;
-    if (this.isOld) {
-      this.sheet.measure();
-      const { width, height } = this.sheet.clear();
-      this.width = width - MARGIN.left - MARGIN.right;
-      const [from, to] = state.ends();
-      const { run } = state;
-      const feed = run.quantity("feed");
-      const count = Math.max(1, Math.round(this.width));
-      const { context } = this.sheet;
-      context.fillStyle = ink("feed");
-      const most = feed.range(0, run.samples) ? feed.high : 0;
-      const tickAt = (i) => state.tickAt(run, from + ((to - from) * i) / count);
-      for (let i = 0; i < count && most > 0; i += 1) {
-        work.columns += 1;
-        const first = run.sampleOf(tickAt(i));
-        if (!feed.range(first, Math.max(first + 1, run.sampleOf(tickAt(i + 1))))) continue;
-        const [top, bottom] = [feed.high, feed.low].map((value) => height - 1 - (value / most) * (height - 3));
-        context.globalAlpha = 0.35;
-        context.fillRect(MARGIN.left + i, bottom, 1, height - bottom);
-        context.globalAlpha = 1;
-        context.fillRect(MARGIN.left + i, top - 0.6, 1, Math.max(1.2, bottom - top));
-      }
-      this.over = state.over;
-      this.isOld = false;
-    }
-    const [from, to] = state.ends();
-    const px = (x) => MARGIN.left + ((x - from) / (to - from)) * this.width;
-    this.window.hidden = state.isWhole();
-    this.window.style.left = `${px(state.from)}px`;
-    this.window.style.width = `${Math.max(3, px(state.to) - px(state.from))}px`;
-  }
-
-  place() {
-    const { state } = this;
-    const [from, to] = state.ends();
-    const x = MARGIN.left + ((state.xOf(state.run, state.cursor) - from) / (to - from)) * this.width;
-    this.line.style.transform = `translateX(${x}px)`;
-  }
-}

@@ -3,6 +3,15 @@
 // The plots lie over time or over path length; x is a time [s] or a path position [mm] accordingly. The cursor is a tick of the
 // page's own run.
 
+/** Zoom of a notch of the wheel, as a power of 2, and pixels of a notch. */
+const ZOOM_PER_NOTCH = 0.35;
+const NOTCH_PX = 100;
+
+/** By how much a turn of the wheel widens the window. */
+export function wheelFactor(deltaPx) {
+  return 2 ** ((ZOOM_PER_NOTCH * deltaPx) / NOTCH_PX);
+}
+
 export class State {
   constructor(runs) {
     this.runs = runs;

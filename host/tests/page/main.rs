@@ -14,7 +14,7 @@ use std::process::ExitCode;
 
 use libtest_mimic::{Arguments, Failed, Trial};
 
-const TESTS: [(&str, fn()); 12] = [
+const TESTS: [(&str, fn()); 13] = [
     ("a_long_run_is_told_in_samples", made_up::a_long_run_is_told_in_samples),
     ("pyramids_neither_lose_nor_invent_peaks", made_up::pyramids_neither_lose_nor_invent_peaks),
     ("late_logs_with_gaps_and_rotary_axes_are_shown", made_up::late_logs_with_gaps_and_rotary_axes_are_shown),
@@ -23,6 +23,7 @@ const TESTS: [(&str, fn()); 12] = [
     ("the_wheel_zooms", report::the_wheel_zooms),
     ("keys_move_cursor_and_window", report::keys_move_cursor_and_window),
     ("colours_are_switched", report::colours_are_switched),
+    ("the_path_is_turned_and_pointed_at", report::the_path_is_turned_and_pointed_at),
     ("worst_places_are_visited", report::worst_places_are_visited),
     ("two_runs_lie_beside_each_other", report::two_runs_lie_beside_each_other),
     ("faults_and_commands_are_marked", report::faults_and_commands_are_marked),

@@ -207,7 +207,7 @@ pub(crate) fn the_wheel_zooms() {
     assert!((browser.number("motion.state.to") - length).abs() < 1e-3);
     // The path zooms as far as its data go.
     let stage = browser.middle(".stage");
-    let pixel = "motion.path.scale * motion.run.outline.toleranceMm";
+    let pixel = "motion.path.camera.scale * motion.run.outline.toleranceMm";
     for _ in 0..40 {
         browser.wheel(stage, -1000);
     }
@@ -268,6 +268,57 @@ pub(crate) fn colours_are_switched() {
     );
     assert!(!pictures.contains(&picture()) && legend().contains("error × 1000"));
     page.browser.close();
+}
+
+pub(crate) fn the_path_is_turned_and_pointed_at() {
+    let workspace = Workspace::new("page-space");
+    workspace
+        .put("part.ngc", "G21 G90 G94 G61\nG0 Z8\nG1 X20 Y10 Z5 F3000\nX40 Y0 Z-5\nX40 Y25 Z-5\nG0 X0\nM2\n");
+    workspace.stdout(&["run", "part.ngc", "--report", "part.html"]);
+    let browser = Browser::open(&workspace.0.join("part.html"), DESK);
+    let stage = browser.middle(".stage");
+    let picture = || browser.after_frame("motion.path.sheet.canvas.toDataURL()");
+    let first = picture();
+    // Rapids are apart.
+    assert!(browser.text("document.querySelector('#path .legend').textContent").contains("rapid"));
+    let rapids = browser.run("return [...motion.run.blocks.isRapid]");
+    assert_eq!(rapids, serde_json::json!([1, 0, 0, 0, 1]));
+    // The scale ends at the feed of cutting moves.
+    assert!(browser.text("document.querySelector('#path .legend').textContent").starts_with("050 mm/s"));
+    let yaw = browser.number("motion.path.camera.yaw");
+    browser.drag(&[stage, [stage[0] + 40.0, stage[1]], [stage[0] + 90.0, stage[1] + 30.0]]);
+    assert_ne!(picture(), first);
+    assert!((browser.number("motion.path.camera.yaw") - yaw - 90.0 / 150.0).abs() < 1e-9);
+    // In space and in a plane the pointer finds the place of a tick, and the cursor goes there.
+    for (view, tick) in [("", 600), ("XZ", 1_000)] {
+        if !view.is_empty() {
+            browser.press(view);
+            browser.after_frame("0");
+        }
+        let place = browser.run(&format!(
+            "const box = motion.path.stage.getBoundingClientRect(); \
+             const [x, y] = motion.path.project(motion.run.placeAt({tick})); return [box.x + x, box.y + y]"
+        ));
+        let place = [0, 1].map(|i| number(&place[i]).round());
+        browser.drag(&[place, place]);
+        browser.after_frame("0");
+        let away_px = browser.number(&format!(
+            "(() => {{ const [a, b] = [motion.state.placed, {tick}].map((t) => motion.path.project(motion.run.placeAt(t))); \
+             return Math.hypot(a[0] - b[0], a[1] - b[1]); }})()"
+        ));
+        assert!(browser.number("motion.state.placed") > 0.0 && away_px <= 1.5, "{view}: {away_px} px");
+        // What is under the pointer stays there.
+        let under = format!(
+            "(() => {{ const [x, y] = motion.path.project(motion.run.placeAt({tick})); \
+             const box = motion.path.stage.getBoundingClientRect(); return Math.hypot(box.x + x - {}, box.y + y - {}); }})()",
+            place[0], place[1]
+        );
+        browser.wheel(place, -300);
+        browser.after_frame("0");
+        // It was half a pixel off at most, and is twice as much.
+        assert!(browser.number(&under) <= 2.0, "{}", browser.number(&under));
+    }
+    browser.close();
 }
 
 pub(crate) fn worst_places_are_visited() {

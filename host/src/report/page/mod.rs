@@ -25,7 +25,7 @@ const INDEX: &str = include_str!("../../../page/index.html");
 const STYLE: &str = include_str!("../../../page/style.css");
 
 /// The page's modules, by the names they import each other by. The last one starts the page.
-const MODULES: [(&str, &str); 14] = [
+const MODULES: [(&str, &str); 20] = [
     ("page/work.js", include_str!("../../../page/work.js")),
     ("page/format.js", include_str!("../../../page/format.js")),
     ("page/data.js", include_str!("../../../page/data.js")),
@@ -34,8 +34,14 @@ const MODULES: [(&str, &str); 14] = [
     ("page/run.js", include_str!("../../../page/run.js")),
     ("page/state.js", include_str!("../../../page/state.js")),
     ("page/theme.js", include_str!("../../../page/theme.js")),
+    ("page/sheet.js", include_str!("../../../page/sheet.js")),
+    ("page/columns.js", include_str!("../../../page/columns.js")),
     ("page/plot.js", include_str!("../../../page/plot.js")),
+    ("page/overview.js", include_str!("../../../page/overview.js")),
     ("page/plots.js", include_str!("../../../page/plots.js")),
+    ("page/camera.js", include_str!("../../../page/camera.js")),
+    ("page/colours.js", include_str!("../../../page/colours.js")),
+    ("page/path-input.js", include_str!("../../../page/path-input.js")),
     ("page/path.js", include_str!("../../../page/path.js")),
     ("page/code.js", include_str!("../../../page/code.js")),
     ("page/tables.js", include_str!("../../../page/tables.js")),
