@@ -43,6 +43,10 @@ export function listen(path) {
     const now = centre();
     const [dx, dy] = [now.x - drag.x, now.y - drag.y];
     const far = drag.far + Math.abs(dx) + Math.abs(dy);
+    if (far <= STILL_PX) {
+      drag.far = far;
+      return;
+    }
     if (drag.turns) {
       camera.turn(dx / PX_PER_RAD, dy / PX_PER_RAD);
     } else {

@@ -372,17 +372,18 @@ export class PathView {
 
   /** The tick of the path nearest to a place of the stage; undefined if none is near. */
   tickNear(x, y) {
-    let [nearest, tick] = [NEAR_PX ** 2, undefined];
+    const { run } = this.state;
     const { parts } = this;
+    let [nearest, found] = [NEAR_PX ** 2, null];
     for (let i = 0; i < parts.length; i += 6) {
       const [dx, dy] = [parts[i + 2] - parts[i], parts[i + 3] - parts[i + 1]];
       const square = dx * dx + dy * dy;
       const along = (x - parts[i]) * dx + (y - parts[i + 1]) * dy;
       const share = square > 0 ? Math.min(1, Math.max(0, along / square)) : 0;
       const away = (x - parts[i] - share * dx) ** 2 + (y - parts[i + 1] - share * dy) ** 2;
-      if (away < nearest) [nearest, tick] = [away, parts[i + 4] + share * (parts[i + 5] - parts[i + 4])];
+      if (away < nearest) [nearest, found] = [away, { share, from: parts[i + 4], to: parts[i + 5] }];
     }
-    return tick;
+    return found ? run.tickBetween(found.from, found.to, found.share) : undefined;
   }
 
   /** Draws what the camera sees now, in full when it has come to rest. */

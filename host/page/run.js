@@ -189,4 +189,11 @@ export class Run {
     const part = end > start ? (this.pathMm(tick) - start) / (end - start) : (tick - from) / (to - from);
     return Math.min(1, Math.max(0, part));
   }
+
+  /** The tick between two others that has come so far along the path between them, 0 to 1. */
+  tickBetween(from, to, part) {
+    const [start, end] = [this.pathMm(from), this.pathMm(to)];
+    if (!(end > start)) return from + part * (to - from);
+    return Math.min(to, Math.max(from, this.tickAtPath(start + part * (end - start))));
+  }
 }
