@@ -51,12 +51,14 @@ function makeTools(state) {
     made.addEventListener("click", act);
     return made;
   };
-  const over = [["Over time [s]", "time"], ["Over path [mm]", "path"]].map(([text, name]) =>
-    button(box, text, "", () => {
-      state.layOver(name);
-      for (const [made, of] of over) made.setAttribute("aria-pressed", String(of === name));
-    })).map((made, i) => [made, ["time", "path"][i]]);
-  over.forEach(([made], i) => made.setAttribute("aria-pressed", String(i === 0)));
+  const over = { time: "Over time [s]", path: "Over path [mm]" };
+  const buttonOf = {};
+  const layOver = (name) => {
+    state.layOver(name);
+    for (const [of, made] of Object.entries(buttonOf)) made.setAttribute("aria-pressed", String(of === name));
+  };
+  for (const [name, text] of Object.entries(over)) buttonOf[name] = button(box, text, "", () => layOver(name));
+  layOver("time");
   const zoom = (factor) => () => {
     const at = state.xOf(state.run, state.cursor);
     state.zoom(at >= state.from && at <= state.to ? at : (state.from + state.to) / 2, factor);

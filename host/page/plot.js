@@ -200,7 +200,7 @@ export class Plot {
       if (!(low <= this.high)) continue;
       const isReached = reason.ink !== "unreached";
       if (!inks.has(reason.ink)) {
-        inks.set(reason.ink, { name: isReached ? reason.name : "not reached", bands: new Path2D(), lines: new Path2D() });
+        inks.set(reason.ink, { name: isReached ? reason.name : "not reached, the block is too short", bands: new Path2D(), lines: new Path2D() });
       }
       const { bands, lines } = inks.get(reason.ink);
       const y = this.py(low);

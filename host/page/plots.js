@@ -64,24 +64,31 @@ export class Plots {
       this.listen(plot);
     }
     state.on("window", () => {
-      for (const plot of this.plots) plot.isOld = true;
+      this.age();
       nextFrame(this.redraw);
     });
     state.on("cursor", () => nextFrame(this.retell));
     const all = () => {
-      for (const plot of this.plots) plot.isOld = true;
+      this.age();
       this.overview.isOld = true;
-      nextFrame(this.redraw);
     };
-    new ResizeObserver(all).observe(this.element);
+    new ResizeObserver(() => {
+      all();
+      nextFrame(this.redraw);
+    }).observe(this.element);
     onChange(() => {
+      all();
       // On paper all of them are seen.
-      for (const plot of this.plots) plot.isOld = true;
-      this.overview.isOld = true;
       this.draw(true);
     });
     this.element.addEventListener("keydown", (event) => this.key(event));
-    all();
+    this.age();
+    nextFrame(this.redraw);
+  }
+
+  /** What is drawn is no longer what is to be seen. */
+  age() {
+    for (const plot of this.plots) plot.isOld = true;
   }
 
   /** The columns of the window, which all plots have. */

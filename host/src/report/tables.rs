@@ -212,7 +212,13 @@ pub(super) fn commands<const N: usize>(trace: &RunTrace<N>) -> String {
     ];
     let mut table = String::from("<h2>Commands</h2>\n");
     table.push_str(&wrapped("Commands", &head, &body));
-    table + &left_out
+    let is_above = |share: Option<f64>| share.is_some_and(|share| share > 1.0);
+    let remark = if trace.commands.iter().any(|command| is_above(command.feed_override)) {
+        "<p class=\"remark\">Under an override above 100 % the feed may pass a programmed ceiling, and no other.</p>\n"
+    } else {
+        ""
+    };
+    table + &left_out + remark
 }
 
 #[cfg(test)]

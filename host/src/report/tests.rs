@@ -442,6 +442,7 @@ fn commands_are_listed() {
         "override 133.3 %",
         "<td>577</td><td>0.5770</td><td class=\"word\">hold</td><td>12.500</td><td>700</td><td>123.4</td><td>3.250</td>",
         "&lt;b&gt;abort",
+        "Under an override above 100 %",
     ] {
         assert!(whole.contains(part), "{part}");
     }
