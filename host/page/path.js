@@ -7,7 +7,7 @@ import { Camera } from "page/camera.js";
 import { coloursOf } from "page/colours.js";
 import { figure, marks, roundStep } from "page/format.js";
 import { listen } from "page/path-input.js";
-import { Sheet } from "page/sheet.js";
+import { Sheet, clearText } from "page/sheet.js";
 import { ink, onChange, shade } from "page/theme.js";
 import { nextFrame, work } from "page/work.js";
 
@@ -261,15 +261,17 @@ export class PathView {
         context.textAlign = way ? "left" : "center";
         context.textBaseline = way ? "middle" : "alphabetic";
         // Corners are for the names of the axes.
-        if (px > 24 && px < size - (way ? 24 : 60)) context.fillText(text(value, decimals), way ? 4 : at, way ? at - 7 : height - 5);
+        if (px > 24 && px < size - (way ? 24 : 60)) {
+          clearText(context, text(value, decimals), way ? 4 : at, way ? at - 7 : height - 5);
+        }
       }
     }
     context.fillStyle = ink("text");
     context.textBaseline = "alphabetic";
     context.textAlign = "right";
-    context.fillText(`${header.axes[axes[0]].name} [mm]`, width - 5, height - 5);
+    clearText(context, `${header.axes[axes[0]].name} [mm]`, width - 5, height - 5);
     context.textAlign = "left";
-    context.fillText(`${header.axes[axes[1]].name} [mm]`, 4, 14);
+    clearText(context, `${header.axes[axes[1]].name} [mm]`, 4, 14);
   }
 
   /** Where the axes point, and how long a round length is. */

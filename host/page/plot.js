@@ -2,7 +2,7 @@
 
 import { MARGIN } from "page/columns.js";
 import { figure, fixed, marks, roundStep } from "page/format.js";
-import { Sheet } from "page/sheet.js";
+import { Sheet, clearText } from "page/sheet.js";
 import { dashes, ink } from "page/theme.js";
 
 /** The part of its limit from which on a plot shows the limit; below it the curve would be flat. */
@@ -282,11 +282,7 @@ export class Plot {
         // A word that has no room is left out; its line stays, and the table has it.
         if (!this.hasCeilings || x < free || x + 4 + width > MARGIN.left + this.width) continue;
         context.textAlign = "left";
-        context.setLineDash([]);
-        context.lineWidth = 4;
-        context.strokeStyle = ink("paper");
-        context.strokeText(word, x + 4, MARGIN.top + 9);
-        context.fillText(word, x + 4, MARGIN.top + 9);
+        clearText(context, word, x + 4, MARGIN.top + 9);
         free = x + width + 10;
       }
       context.setLineDash([]);

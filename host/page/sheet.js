@@ -1,5 +1,19 @@
 // A canvas that fills its element at the screen's resolution.
 
+import { ink } from "page/theme.js";
+
+/** Text that stands out from lines below it. */
+export function clearText(context, text, x, y) {
+  context.save();
+  context.setLineDash([]);
+  context.lineWidth = 4;
+  context.lineJoin = "round";
+  context.strokeStyle = ink("paper");
+  context.strokeText(text, x, y);
+  context.restore();
+  context.fillText(text, x, y);
+}
+
 /** The page's, for what is drawn. */
 let font;
 
