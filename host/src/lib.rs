@@ -22,7 +22,7 @@
 //!   drive      Machine ─► figures of its axes     step, harmonics, circles
 //!   identify   recordings ─► drive parameters     what an axis is, from its runs
 //!   tuning     drive parameters ─► gains          with the reason for each
-//!   report     RunTrace ─► HTML                  one file, pictures inside
+//!   report     RunTrace ─► HTML                  one file, its data inside
 //!   cli        the `motion` command
 //! ```
 

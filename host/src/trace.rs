@@ -19,6 +19,8 @@ pub struct RunTrace<const N: usize = 3> {
     pub machine: String,
     /// Control tick \[s\].
     pub tick_s: f64,
+    /// The program, where it is at hand: no recording has it.
+    pub source: Option<TracedProgram>,
     /// Limits along the path.
     pub limits: PathLimits,
     /// The axes that there are, which have the first places.
@@ -165,6 +167,17 @@ pub struct TracedBlock {
     pub exit_mm_s: f64,
     /// Duration \[s\].
     pub time_s: f64,
+    /// Whether the program moves here as fast as the machine can, and cuts nothing (G0).
+    pub is_rapid: bool,
+}
+
+/// The program of a run, for people.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TracedProgram {
+    /// Its text.
+    pub text: String,
+    /// Where the time of its plan goes: a reason in words, and its time \[s\].
+    pub times: Vec<(&'static str, f64)>,
 }
 
 /// One tick: set values along the path, and every axis.

@@ -26,6 +26,7 @@ pub fn demonstrate(out: &mut dyn Write) -> Result<Outcome, CliError> {
     let program = gcode::read(STRINGER_NAME, STRINGER.as_bytes())?;
     let plan = plan_program(STRINGER_NAME, &program, &machine, Mode::Spanning)?;
     let outputs = Outputs::report(&mut Files::reading([]), "the report", REPORT.into())?;
+    let outputs = outputs.of_program(STRINGER.as_bytes(), &plan);
     let mut say = |text: &str| writeln!(out, "{text}").map_err(CliError::Output);
     say("Demonstration: a stringer flange, 5000 mm/min, on the reference machine.\n")?;
     for line in STRINGER.lines() {

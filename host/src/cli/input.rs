@@ -128,6 +128,20 @@ pub(super) fn read(path: &Path) -> Result<Source, CliError> {
     }
 }
 
+/// Only one input can be standard input.
+pub(super) fn differ(
+    role: &str,
+    path: &Path,
+    other_role: &str,
+    other: Option<&Path>,
+) -> Result<(), CliError> {
+    if path.as_os_str() != STANDARD_INPUT || other.is_none_or(|other| other != path) {
+        return Ok(());
+    }
+    let source = io::Error::other(format!("standard input, which is {role} already"));
+    Err(CliError::Read { path: format!("{other_role} {STANDARD_INPUT}"), source })
+}
+
 /// Reads the file of a machine of any number of axes; without one, the reference machine.
 pub(super) fn any_machine(path: Option<&PathBuf>) -> Result<AnyMachine, CliError> {
     match path {

@@ -43,6 +43,7 @@
 //! - [`error`]: errors and exit statuses;
 //! - `input`, `outputs`, `port`, `until_closed`, `table`, `trace`, `units`, `progress`: shared by the commands.
 
+mod against;
 pub mod board;
 pub mod check;
 pub mod compare;

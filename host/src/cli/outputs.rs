@@ -7,10 +7,12 @@ use super::error::{CliError, Outcome};
 use super::progress::Progress;
 use super::trace::{TraceArguments, TraceWriter};
 use super::until_closed::UntilClosed;
+use crate::check::{Reason, Times};
 use crate::files::{Failure, Files, FilesError, OutputFile};
-use crate::report;
+use crate::planning::Plan;
+use crate::report::{self, PageRun};
 use crate::simulate::{Job, Observer, RunError, RunInfo, RunSummary};
-use crate::trace::{RunTrace, TraceRow};
+use crate::trace::{RunTrace, TraceRow, TracedProgram};
 
 /// Opens the file of an option, if it is given.
 pub(super) fn open(
@@ -80,6 +82,10 @@ pub(super) struct Outputs {
     /// What of it.
     of_trace: TraceArguments,
     report: Option<OutputFile>,
+    /// What the report shows of the program.
+    program: Option<TracedProgram>,
+    /// The run that the report shows beside it.
+    against: Option<PageRun>,
 }
 
 /// Where a trace goes.
@@ -131,7 +137,8 @@ impl Outputs {
         } else {
             open(files, "--trace", of_trace.trace.as_ref())?.map(TraceOutput::File)
         };
-        Ok(Self { trace, of_trace: of_trace.clone(), report: open(files, "--report", report)? })
+        let report = open(files, "--report", report)?;
+        Ok(Self { trace, of_trace: of_trace.clone(), report, program: None, against: None })
     }
 
     /// Where the rest of a command's output goes: nowhere, where the trace has standard output.
@@ -144,17 +151,30 @@ impl Outputs {
 
     /// Only the report; `role` names its option.
     pub(super) fn report(files: &mut Files, role: &'static str, path: PathBuf) -> Result<Self, FilesError> {
-        let of_trace = TraceArguments::default();
-        Ok(Self { trace: None, of_trace, report: open(files, role, Some(&path))? })
+        let (of_trace, report) = (TraceArguments::default(), open(files, role, Some(&path))?);
+        Ok(Self { trace: None, of_trace, report, program: None, against: None })
+    }
+
+    /// With the program's text, and where the time of its plan goes.
+    pub(super) fn of_program<const N: usize>(mut self, text: &[u8], plan: &Plan<N>) -> Self {
+        self.program = Some(traced(text, plan));
+        self
+    }
+
+    /// With another run beside it.
+    pub(super) fn against(mut self, run: PageRun) -> Self {
+        self.against = Some(run);
+        self
     }
 
     /// Runs a job with `run` and writes the files about it. A run that can't be made leaves no files.
     pub(super) fn of_run<const N: usize, T>(
-        self,
+        mut self,
         job: &Job<N>,
         run: impl FnOnce(&mut Observer<'_, N>) -> Result<T, RunError>,
         summary_of: impl Fn(&T) -> &RunSummary,
     ) -> Result<(T, Written), CliError> {
+        let source = self.program.take();
         let (ran, ticks) = self.of_ticks(&job.info, |observe: &mut Observer<'_, N>| {
             let mut progress = Progress::new((job.info.planned_time_s / job.info.tick_s) as u64);
             let ran = run(&mut |tick| {
@@ -165,7 +185,7 @@ impl Outputs {
             ran
         })?;
         let ran = ran.map_err(|source| CliError::Run { program: job.info.program.clone(), source })?;
-        let written = ticks.write(|ticks| trace_of(job, summary_of(&ran), ticks));
+        let written = ticks.write(|ticks| RunTrace { source, ..trace_of(job, summary_of(&ran), ticks) });
         Ok((ran, written))
     }
 
@@ -193,7 +213,7 @@ impl Outputs {
             };
             (named, TraceWriter::new(output, info, selection))
         });
-        let mut ticks = Ticks { trace, report: self.report, ticks: Vec::new() };
+        let mut ticks = Ticks { trace, report: self.report, against: self.against, ticks: Vec::new() };
         let ran = run(&mut |tick| ticks.add(tick));
         Ok((ran, ticks))
     }
@@ -204,6 +224,7 @@ pub(super) struct Ticks<const N: usize> {
     /// With its file's name, and what tells of a failure there.
     trace: Option<(Option<(String, Failure)>, TraceWriter<TraceOutput>)>,
     report: Option<OutputFile>,
+    against: Option<PageRun>,
     ticks: Vec<TraceRow<N>>,
 }
 
@@ -230,13 +251,29 @@ impl<const N: usize> Ticks<N> {
                 (None, Err(source)) => written.printed = Some(source),
             }
         }
-        let ticks = self.ticks;
-        written.write("report", self.report, |file| report::write_html(&trace(ticks), file));
+        let (ticks, against) = (self.ticks, self.against);
+        written
+            .write("report", self.report, |file| report::write_html(&trace(ticks), against.as_ref(), file));
         written
     }
 }
 
-fn trace_of<const N: usize>(job: &Job<N>, summary: &RunSummary, ticks: Vec<TraceRow<N>>) -> RunTrace<N> {
+/// A program for the report of its run.
+pub(super) fn traced<const N: usize>(text: &[u8], plan: &Plan<N>) -> TracedProgram {
+    let times = Times::of(plan);
+    let of_reason = |reason: Reason| (reason.words(), times.of_reason_s(reason));
+    TracedProgram {
+        text: String::from_utf8_lossy(text).into_owned(),
+        times: Reason::ALL.map(of_reason).into_iter().filter(|(_, time_s)| *time_s > 0.0).collect(),
+    }
+}
+
+/// What a run leaves behind.
+pub(super) fn trace_of<const N: usize>(
+    job: &Job<N>,
+    summary: &RunSummary,
+    ticks: Vec<TraceRow<N>>,
+) -> RunTrace<N> {
     let mut trace = RunTrace {
         ticks,
         end: summary.end,

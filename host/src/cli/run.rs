@@ -7,6 +7,7 @@ use clap::Args;
 use motion_kernel::hal::OutputState;
 use serde::Serialize;
 
+use super::against;
 use super::error::{CliError, Outcome};
 use super::input;
 use super::outputs::{self, Outputs, Written};
@@ -28,7 +29,9 @@ use crate::trace::{RunEnd, TracedCommand, TracedFault, TracedSwitch};
 const EXAMPLES: &str = "\
 Examples:
   motion run part.ngc                                run on the reference machine, print a summary
-  motion run part.ngc --report part.html             and write a page with plots of the run
+  motion run part.ngc --report part.html             and write a page to look into the run
+  motion run part.ngc --report part.html --against before.ngc
+                                                     with the curves of another program, or of a recording, beside it
   motion run part.ngc --machine mine.toml --trace part.csv
                                                      every tick of every axis, for a spreadsheet
   motion run part.ngc --at N50:hold,1.3s:resume,3000:override=0.5
@@ -62,9 +65,12 @@ pub struct RunArguments {
     reading: input::ReadingArguments,
     #[command(flatten)]
     trace: TraceArguments,
-    /// Write a self-contained HTML page about the run; an existing file is replaced.
+    /// Write a self-contained HTML page about the run, for a browser; an existing file is replaced.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
+    /// Show another run in the report, too: a program, run on the same machine, or a recording of `--record`.
+    #[arg(long, value_name = "FILE", requires = "report")]
+    against: Option<PathBuf>,
     /// Record the kernel's inputs, tick by tick, for `motion replay`; an existing file is replaced.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
@@ -103,10 +109,12 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
         ("--machine", arguments.machine.as_deref()),
         ("--parameters", arguments.reading.parameters.as_deref()),
         ("--tools", arguments.reading.tools.as_deref()),
+        ("--against", arguments.against.as_deref()),
     ]);
     let outputs = Outputs::open(&mut files, &arguments.trace, arguments.report.as_ref(), arguments.json)?;
     let mut printed = outputs.printed(out);
     let out = &mut *printed;
+    input::differ("PROGRAM", &arguments.program, "--against", arguments.against.as_deref())?;
     let record = outputs::open(&mut files, "--record", arguments.record.as_ref())?;
     let kept = arguments.reading.parameters.as_ref();
     let kept = kept.map(|path| files.edited("--parameters", path, "--parameters")).transpose()?;
@@ -121,8 +129,12 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
         ..RunOptions::default()
     };
     let (summary, mut written) = on_machine!(machine, machine => {
+        let outputs = match &arguments.against {
+            Some(path) => outputs.against(against::run(path, &arguments.reading, machine)?),
+            None => outputs,
+        };
         let plan = plan_program(&source.name, &program, machine, Mode::Spanning)?;
-        execute(&options, &plan, machine, outputs, record)
+        execute(&options, &plan, machine, outputs.of_program(&source.text, &plan), record)
     })?;
     // A run that ended early has not set what the program would set later.
     if Outcome::of(&summary) == Outcome::Done {

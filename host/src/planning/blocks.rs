@@ -139,6 +139,7 @@ pub fn plan_blocks(source_name: &str, text: &[u8], mode: Mode) -> Result<Plan, P
             peak_mm_s: plan.peak_mm_s,
             exit_mm_s: plan.exit_mm_s,
             time_s,
+            is_rapid: false,
         });
         start_mm = end_mm;
     }

@@ -186,6 +186,7 @@ impl<const N: usize> Stretch<N> {
                 peak_mm_s: plan.peak_mm_s,
                 exit_mm_s: plan.exit_mm_s,
                 time_s,
+                is_rapid: block.feed_mm_s.is_infinite(),
             });
             start_mm = end_mm;
         }

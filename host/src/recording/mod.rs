@@ -6,7 +6,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | `MREC` |
-//! | 1 | version of this format, 4 |
+//! | 1 | version of this format, 5 |
 //! | 1 | places for axes, 3 or 9: [`places`] |
 //! | … | [`Recording`] in the [postcard](https://postcard.jamesmunns.com) wire format |
 //! | 4 | CRC-32 (ISO-HDLC) of all before it, least significant byte first |
@@ -40,7 +40,7 @@ use self::answers::RecordedAnswers;
 use crate::simulate::{Job, Number};
 
 const MAGIC: [u8; 4] = *b"MREC";
-const VERSION: u8 = 4;
+const VERSION: u8 = 5;
 
 /// A recorded run of a machine with `N` places for axes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

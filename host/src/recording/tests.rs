@@ -176,7 +176,7 @@ fn the_format_has_these_lengths() {
         length(postcard::to_stdvec(&guards)),
         items.map(|item| length(postcard::to_stdvec(&item))),
     );
-    assert_eq!((VERSION, found), (4, (360, 206, [30, 174, 51, 4, 6, 1, 12, 82])));
+    assert_eq!((VERSION, found), (5, (360, 206, [30, 174, 51, 4, 6, 1, 12, 82])));
 }
 
 #[test]
@@ -190,7 +190,7 @@ fn strangers_are_named() {
     );
     let mut newer = bytes.clone();
     newer[4] = 9;
-    assert_eq!(message(&newer), "found a recording of format 9, expected format 4");
+    assert_eq!(message(&newer), "found a recording of format 9, expected format 5");
     assert!(message(&bytes[..bytes.len() - 1]).contains("damaged or not whole"));
 
     // With a checksum that fits.

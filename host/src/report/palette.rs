@@ -30,6 +30,12 @@ impl Ink {
         RGBColor(r, g, b)
     }
 
+    /// What a page calls it.
+    pub(super) fn name(self) -> String {
+        let name = named().find(|(_, ink)| ink.light == self.light).map(|(name, _)| name);
+        name.unwrap_or_default()
+    }
+
     /// The same as the drawing library writes it, `#RRGGBB`.
     pub(super) fn hex(self) -> String {
         format!("#{:06X}", self.light)
@@ -129,40 +135,63 @@ pub(super) fn series(index: usize) -> Ink {
     SERIES[index % SERIES.len()]
 }
 
-/// Inks that stand alone.
-const SINGLE: [Ink; 17] = [
-    TEXT,
-    AXIS,
-    GRID,
-    RULE,
-    REST,
-    LIMIT,
-    FAULT,
-    COMMAND,
-    OVERRIDE,
-    FEED,
-    ACCELERATION,
-    JERK,
-    SNAP,
-    ERROR,
-    CONTOUR,
-    VOLTS,
-    UNREACHED,
+/// Inks that stand alone, by what a page calls them.
+const SINGLE: [(&str, Ink); 17] = [
+    ("text", TEXT),
+    ("axis", AXIS),
+    ("grid", GRID),
+    ("rule", RULE),
+    ("rest", REST),
+    ("limit", LIMIT),
+    ("fault", FAULT),
+    ("command", COMMAND),
+    ("override", OVERRIDE),
+    ("feed", FEED),
+    ("acceleration", ACCELERATION),
+    ("jerk", JERK),
+    ("snap", SNAP),
+    ("error", ERROR),
+    ("contour", CONTOUR),
+    ("volts", VOLTS),
+    ("unreached", UNREACHED),
 ];
 
-fn inks() -> impl Iterator<Item = &'static Ink> {
-    SINGLE.iter().chain(&CEILINGS).chain(&CLASSES).chain(&SERIES)
+/// Inks with their names.
+fn named() -> impl Iterator<Item = (String, Ink)> {
+    let numbered = |name: &'static str, inks: &'static [Ink]| {
+        inks.iter().enumerate().map(move |(index, &ink)| (format!("{name}-{index}"), ink))
+    };
+    let single = SINGLE.iter().map(|&(name, ink)| (name.to_owned(), ink));
+    let numbered = [("ceiling", &CEILINGS[..]), ("class", &CLASSES), ("series", &SERIES)]
+        .map(|(name, inks)| numbered(name, inks));
+    single.chain(numbered.into_iter().flatten())
+}
+
+/// The inks as variables of a style sheet, which scripts and rules read.
+pub(super) fn variables() -> String {
+    let list = |colour: fn(&Ink) -> u32| -> String {
+        named().map(|(name, ink)| format!("--{name}:#{:06x};", colour(&ink))).collect()
+    };
+    let dashes: String = named().map(|(name, ink)| format!("--dash-{name}:{};", ink.dash)).collect();
+    let (light, dark) = (list(|ink| ink.light), list(|ink| ink.dark));
+    format!(
+        ":root{{{light}{dashes}}}\n@media screen and (prefers-color-scheme:dark){{:root:not([data-theme=light]){{{dark}}}}}\n"
+    )
+}
+
+fn inks() -> impl Iterator<Item = Ink> {
+    named().map(|(_, ink)| ink)
 }
 
 /// Rules that put its dashes on every line drawn in an ink of `inks`.
-fn dashes<'a>(inks: impl Iterator<Item = &'a Ink>) -> String {
-    let rule = |ink: &Ink| format!("svg [stroke=\"{}\"]{{stroke-dasharray:{}}}\n", ink.hex(), ink.dash);
+fn dashes(inks: impl Iterator<Item = Ink>) -> String {
+    let rule = |ink: Ink| format!("svg [stroke=\"{}\"]{{stroke-dasharray:{}}}\n", ink.hex(), ink.dash);
     inks.filter(|ink| !ink.dash.is_empty()).map(rule).collect()
 }
 
 /// Rules for a picture of its own, on white paper: the dashes of limits and of [`SERIES`].
 pub(super) fn picture_style_sheet() -> String {
-    dashes(SERIES.iter().chain([&LIMIT]))
+    dashes(SERIES.into_iter().chain([LIMIT]))
 }
 
 /// Rules that put every ink on dark paper, and its dashes on every line drawn in it.
@@ -231,5 +260,8 @@ mod tests {
         let known = ["programmed", "axis velocity", "corner"];
         let inks = known.map(|reason| ceiling(reason, &known).light);
         assert_eq!(inks, [CEILINGS[0].light, CEILINGS[4].light, CEILINGS[5].light]);
+        let names = ["snap", "corner", NOT_REACHED].map(|reason| ceiling(reason, &known).name());
+        assert_eq!(names, ["ceiling-3", "ceiling-5", "unreached"]);
+        assert!(variables().contains("--ceiling-5:#7a5c00;") && variables().contains("--dash-fault:20 12;"));
     }
 }

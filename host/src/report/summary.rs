@@ -106,8 +106,6 @@ impl AxisSummary {
 pub(super) struct Summary {
     /// How it ended.
     pub(super) outcome: Outcome,
-    /// First and last instant \[s\].
-    pub(super) time_s: (f64, f64),
     /// Ticks times their length \[s\].
     pub(super) executed_time_s: f64,
     /// Length of the planned path \[mm\].
@@ -194,11 +192,9 @@ impl Summary {
         } else {
             Outcome::Done
         };
-        let instant = |tick: Option<&TraceRow<N>>| tick.map_or(0.0, |tick| tick.tick as f64 * trace.tick_s);
         let [feed_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4] = path;
         Self {
             outcome,
-            time_s: (instant(trace.ticks.first()), instant(trace.ticks.last())),
             executed_time_s: trace.ticks.len() as f64 * trace.tick_s,
             path_length_mm,
             path_done_mm,

@@ -1,9 +1,9 @@
-//! The tables: key figures, axes, faults, commands, blocks.
+//! The tables: key figures, axes, faults, commands.
 
 use std::fmt::Write as _;
 
+use super::command_word;
 use super::format::{count, counted, duration, escape, figure, fixed, share};
-use super::plots::marks;
 use super::summary::{Span, Summary};
 use crate::axis_unit::AxisUnit;
 use crate::trace::RunTrace;
@@ -196,7 +196,7 @@ pub(super) fn commands<const N: usize>(trace: &RunTrace<N>) -> String {
             "<tr><td>{}</td><td>{:.4}</td><td class=\"word\">{}</td><td>{}</td>{stop}</tr>",
             command.tick,
             command.tick as f64 * trace.tick_s,
-            escape(&marks::word(command)),
+            escape(&command_word(command)),
             fixed(command.s_mm, 3),
         );
     }
@@ -212,45 +212,13 @@ pub(super) fn commands<const N: usize>(trace: &RunTrace<N>) -> String {
     ];
     let mut table = String::from("<h2>Commands</h2>\n");
     table.push_str(&wrapped("Commands", &head, &body));
-    table + &left_out
-}
-
-/// A row per block.
-pub(super) fn blocks<const N: usize>(trace: &RunTrace<N>) -> String {
-    let mut body = String::new();
-    for block in trace.blocks.iter().take(ROWS_MAX) {
-        let _ = writeln!(
-            body,
-            "<tr><th scope=\"row\">{}</th><td class=\"word\">{}</td><td>{}</td><td>{}</td><td class=\"word\">{}</td>\
-             <td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-            block.line,
-            escape(&block.kind),
-            fixed(block.length_mm, 3),
-            fixed(block.cap_mm_s, 2),
-            escape(&block.cap_reason),
-            fixed(block.enter_mm_s, 2),
-            fixed(block.peak_mm_s, 2),
-            fixed(block.exit_mm_s, 2),
-            fixed(block.time_s * 1e3, 2),
-        );
-    }
-    let head = [
-        "*Line",
-        "*Kind",
-        "Length [mm]",
-        "Ceiling [mm/s]",
-        "*Limited by",
-        "Enter [mm/s]",
-        "Peak [mm/s]",
-        "Exit [mm/s]",
-        "Time [ms]",
-    ];
-    let table = wrapped("Blocks", &head, &body);
-    let left_out = LeftOut::of(trace.blocks.len()).map_or(String::new(), LeftOut::remark);
-    format!(
-        "<p>{} in path order; line: the line of the program.</p>\n{table}{left_out}",
-        counted(trace.blocks.len(), "block", "blocks")
-    )
+    let is_above = |share: Option<f64>| share.is_some_and(|share| share > 1.0);
+    let remark = if trace.commands.iter().any(|command| is_above(command.feed_override)) {
+        "<p class=\"remark\">Under an override above 100 % the feed may pass a programmed ceiling, and no other.</p>\n"
+    } else {
+        ""
+    };
+    table + &left_out + remark
 }
 
 #[cfg(test)]

@@ -27,6 +27,17 @@ fn names(workspace: &Workspace) -> Vec<String> {
 
 const THREE: [&str; 3] = ["kept.html", "machine.toml", "part.ngc"];
 
+/// Standard input is read once.
+#[test]
+fn one_input_is_standard_input() {
+    let workspace = folder("standard-input");
+    assert_eq!(
+        workspace.refusal(&["run", "-", "--report", "new.html", "--against", "-"]),
+        "--against -: found standard input, which is PROGRAM already, expected a readable file"
+    );
+    assert!(!workspace.0.join("new.html").exists());
+}
+
 #[test]
 fn an_output_is_no_input() {
     let workspace = folder("same-input");
@@ -44,6 +55,11 @@ fn an_output_is_no_input() {
         ),
         (&["run", "part.ngc", "--report", "part.ngc"], "PROGRAM part.ngc", "--report part.ngc"),
         (&["run", "part.ngc", "--report", "./part.ngc"], "PROGRAM part.ngc", "--report ./part.ngc"),
+        (
+            &["run", "part.ngc", "--report", "part.mrec", "--against", "part.mrec"],
+            "--against part.mrec",
+            "--report part.mrec",
+        ),
         (
             &["run", "part.ngc", "--record", "../cli-same-input/part.ngc"],
             "PROGRAM part.ngc",

@@ -68,9 +68,7 @@ impl Stack {
                     x,
                     y,
                     x_name: last.then_some(self.x_name),
-                    right: layout.right,
                     is_logarithmic: self.is_logarithmic,
-                    shade: &[],
                 };
                 let mut chart = panel.draw(part, layout)?;
                 let limit = palette::LIMIT.rgb().stroke_width(5);

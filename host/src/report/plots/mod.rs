@@ -4,13 +4,8 @@
 //! takes its letters along. The style layout shows one of the two. The drawing library places things on whole
 //! units only, so a layout has [`UNITS_PER_PX`] of them to a pixel, and a smooth curve stays smooth.
 
-pub(super) mod contour;
-pub(super) mod feed;
 pub(super) mod graph;
-pub(super) mod marks;
-pub(super) mod path;
 pub(super) mod polar;
-pub(super) mod time;
 
 use std::io;
 
@@ -26,9 +21,6 @@ use super::summary::Span;
 
 /// Drawing units to a pixel of the page.
 pub(super) const UNITS_PER_PX: u32 = 4;
-
-/// Fault marks in one plot; more than these would hide the curve they are to explain.
-const FAULT_MARKS_MAX: usize = 20;
 
 /// A part of the picture.
 pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -102,12 +94,6 @@ impl Layout {
     /// Room the marks and the name of the axis take below a panel.
     pub(super) fn axis_height(&self) -> u32 {
         self.text * 5 / 2
-    }
-
-    /// Width of `text` in drawing units, on the safe side: letters are at most 0.62 of the font size on
-    /// average.
-    pub(super) fn width_of(&self, text: &str) -> f64 {
-        text.chars().count() as f64 * f64::from(self.text) / 1.24 * 0.62
     }
 }
 
@@ -194,12 +180,8 @@ pub(super) struct Panel<'a> {
     pub(super) y: (f64, f64),
     /// Name and unit of the horizontal axis; without one it has neither marks nor name.
     pub(super) x_name: Option<&'a str>,
-    /// Room on the right.
-    pub(super) right: u32,
     /// The horizontal axis holds decimal logarithms, and is marked with what they are of.
     pub(super) is_logarithmic: bool,
-    /// Stretches of the horizontal axis to be shaded.
-    pub(super) shade: &'a [(f64, f64)],
 }
 
 impl Panel<'_> {
@@ -210,16 +192,12 @@ impl Panel<'_> {
         area.draw(&Text::new(self.title.to_string(), (layout.left as i32, 4), title))?;
         let mut chart = ChartBuilder::on(area)
             .margin_top(layout.title_height())
-            .margin_right(self.right)
+            .margin_right(layout.right)
             .margin_bottom(if self.x_name.is_some() { 0 } else { layout.text / 2 })
             .y_label_area_size(layout.left)
             .x_label_area_size(if self.x_name.is_some() { layout.axis_height() } else { 0 })
             .build_cartesian_2d(self.x.0..self.x.1, self.y.0..self.y.1)?;
         let (x_span, y_span) = (self.x.1 - self.x.0, self.y.1 - self.y.0);
-        // First, so that grid and curve lie on it.
-        chart.draw_series(self.shade.iter().map(|&(from, to)| {
-            Rectangle::new([(from, self.y.0), (to, self.y.1)], palette::REST.rgb().filled())
-        }))?;
         chart
             .configure_mesh()
             .light_line_style(TRANSPARENT)
@@ -282,30 +260,6 @@ pub(super) fn curve(chart: &mut Chart<'_>, points: Vec<(f64, f64)>, ink: Ink, st
     Ok(())
 }
 
-/// An upright dashed line, as high as `y`, at each place within `x` where a fault was latched.
-pub(super) fn fault_marks(chart: &mut Chart<'_>, at: &[f64], x: (f64, f64), y: (f64, f64)) -> Drawn {
-    uprights(chart, at, x, y, FAULT_MARKS_MAX, palette::FAULT.rgb().stroke_width(6))
-}
-
-/// The same where a command was given.
-pub(super) fn command_marks(chart: &mut Chart<'_>, at: &[f64], x: (f64, f64), y: (f64, f64)) -> Drawn {
-    uprights(chart, at, x, y, marks::COMMAND_MARKS_MAX, palette::COMMAND.rgb().stroke_width(4))
-}
-
-/// Upright lines, as high as `y`, at the first `most` places within `x`.
-fn uprights(
-    chart: &mut Chart<'_>,
-    at: &[f64],
-    x: (f64, f64),
-    y: (f64, f64),
-    most: usize,
-    style: ShapeStyle,
-) -> Drawn {
-    let inside = at.iter().filter(|at| (x.0..=x.1).contains(*at)).take(most);
-    chart.draw_series(inside.map(|&x| PathElement::new([(x, y.0), (x, y.1)], style)))?;
-    Ok(())
-}
-
 /// Ends of an axis that shows all of `span`, and zero, with a little air. Never empty.
 pub(super) fn ends_with_zero(span: Span) -> (f64, f64) {
     if span.magnitude() < f64::MIN_POSITIVE {
@@ -314,9 +268,4 @@ pub(super) fn ends_with_zero(span: Span) -> (f64, f64) {
     let (low, high) = (span.low.min(0.0), span.high.max(0.0));
     let air = 0.06 * (high - low);
     (if low < 0.0 { low - air } else { 0.0 }, if high > 0.0 { high + air } else { 0.0 })
-}
-
-/// Ends of an axis over `from..to`. Never empty.
-pub(super) fn ends_over(from: f64, to: f64) -> (f64, f64) {
-    if to > from { (from, to) } else { (from - 0.5, from + 0.5) }
 }

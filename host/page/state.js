@@ -1,0 +1,122 @@
+// What all parts of the page share: one cursor, one window of the run, and who wants to know of changes.
+//
+// The plots lie over time or over path length; x is a time [s] or a path position [mm] accordingly. The cursor is a tick of the
+// page's own run.
+
+/** Zoom of a notch of the wheel, as a power of 2, and pixels of a notch. */
+const ZOOM_PER_NOTCH = 0.35;
+const NOTCH_PX = 100;
+
+/** By how much a turn of the wheel widens the window. */
+export function wheelFactor(deltaPx) {
+  return 2 ** ((ZOOM_PER_NOTCH * deltaPx) / NOTCH_PX);
+}
+
+export class State {
+  constructor(runs) {
+    this.runs = runs;
+    this.run = runs[0];
+    this.over = "time";
+    this.cursor = 0;
+    /** Where the cursor was set; it comes back when a pointer that it followed leaves. */
+    this.placed = 0;
+    this.listeners = { cursor: [], window: [] };
+    this.showAll();
+  }
+
+  on(change, listener) {
+    this.listeners[change].push(listener);
+  }
+
+  tell(change) {
+    for (const listener of this.listeners[change]) listener();
+  }
+
+  /** The tick of a run at x. */
+  tickAt(run, x) {
+    return this.over === "time" ? run.tickAtTime(x) : run.tickAtPath(x);
+  }
+
+  /** x of a tick of a run. */
+  xOf(run, tick) {
+    return this.over === "time" ? run.timeS(tick) : run.pathMm(tick);
+  }
+
+  /** The ends of x over all runs. */
+  ends() {
+    const from = Math.min(...this.runs.map((run) => this.xOf(run, 0)));
+    const to = Math.max(...this.runs.map((run) => this.xOf(run, run.ticks - 1)));
+    return to > from ? [from, to] : [from - 0.5, from + 0.5];
+  }
+
+  isWhole() {
+    const [from, to] = this.ends();
+    return this.from <= from && this.to >= to;
+  }
+
+  showAll() {
+    [this.from, this.to] = this.ends();
+    this.tell("window");
+  }
+
+  /** Shows a window, moved to within the run, and no narrower than ten samples. */
+  show(from, to) {
+    const [first, last] = this.ends();
+    const run = this.run;
+    const least = this.over === "time" ? 10 * run.ticksPerSample * run.tickS : (last - first) / run.samples;
+    const width = Math.min(last - first, Math.max(least, to - from));
+    const start = Math.min(last - width, Math.max(first, (from + to - width) / 2));
+    [this.from, this.to] = [start, start + width];
+    this.tell("window");
+  }
+
+  /** Zooms around x. */
+  zoom(x, factor) {
+    const width = (this.to - this.from) * factor;
+    const start = x - ((x - this.from) / (this.to - this.from)) * width;
+    this.show(start, start + width);
+  }
+
+  /** Moves the window by a part of its width. */
+  pan(part) {
+    const by = part * (this.to - this.from);
+    this.show(this.from + by, this.to + by);
+  }
+
+  /** Lies the plots over "time" or "path", with the same ticks in the window. */
+  layOver(over) {
+    const [from, to] = [this.tickAt(this.run, this.from), this.tickAt(this.run, this.to)];
+    const whole = this.isWhole();
+    this.over = over;
+    if (whole) this.showAll();
+    else this.show(this.xOf(this.run, from), this.xOf(this.run, to));
+  }
+
+  /** Moves the cursor to a tick for as long as a pointer is there. */
+  hover(tick) {
+    const last = Math.max(0, this.run.ticks - 1);
+    this.cursor = Math.min(last, Math.max(0, Math.round(tick)));
+    this.tell("cursor");
+  }
+
+  /** Sets the cursor. */
+  place(tick) {
+    this.hover(tick);
+    this.placed = this.cursor;
+  }
+
+  /** Brings it back to where it was set. */
+  leave() {
+    if (this.cursor !== this.placed) this.hover(this.placed);
+  }
+
+  /** Sets the cursor, and moves the window to show it. */
+  visit(tick) {
+    this.place(tick);
+    const x = this.xOf(this.run, this.cursor);
+    if (x < this.from || x > this.to) {
+      const half = (this.to - this.from) / 2;
+      this.show(x - half, x + half);
+    }
+  }
+}

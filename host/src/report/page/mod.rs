@@ -1,0 +1,193 @@
+//! The page of a run: `host/page`, with a run's data in it, as one file.
+//!
+//! The page's modules import each other by names that an import map gives to their text, so the file works without a server.
+//! What it says about the run in words and tables is made here, and is there without a script, too.
+
+mod column;
+mod data;
+mod outline;
+mod samples;
+mod worst;
+
+use std::io::{self, Write};
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use serde::Serialize;
+
+use super::format::escape;
+use super::palette;
+use super::summary::Summary;
+use super::{file_name, program_name};
+use crate::trace::RunTrace;
+
+const INDEX: &str = include_str!("../../../page/index.html");
+const STYLE: &str = include_str!("../../../page/style.css");
+
+/// The page's modules, by the names they import each other by. The last one starts the page.
+const MODULES: [(&str, &str); 20] = [
+    ("page/work.js", include_str!("../../../page/work.js")),
+    ("page/format.js", include_str!("../../../page/format.js")),
+    ("page/data.js", include_str!("../../../page/data.js")),
+    ("page/source.js", include_str!("../../../page/source.js")),
+    ("page/pyramid.js", include_str!("../../../page/pyramid.js")),
+    ("page/run.js", include_str!("../../../page/run.js")),
+    ("page/state.js", include_str!("../../../page/state.js")),
+    ("page/theme.js", include_str!("../../../page/theme.js")),
+    ("page/sheet.js", include_str!("../../../page/sheet.js")),
+    ("page/columns.js", include_str!("../../../page/columns.js")),
+    ("page/plot.js", include_str!("../../../page/plot.js")),
+    ("page/overview.js", include_str!("../../../page/overview.js")),
+    ("page/plots.js", include_str!("../../../page/plots.js")),
+    ("page/camera.js", include_str!("../../../page/camera.js")),
+    ("page/colours.js", include_str!("../../../page/colours.js")),
+    ("page/path-input.js", include_str!("../../../page/path-input.js")),
+    ("page/path.js", include_str!("../../../page/path.js")),
+    ("page/code.js", include_str!("../../../page/code.js")),
+    ("page/tables.js", include_str!("../../../page/tables.js")),
+    ("page/main.js", include_str!("../../../page/main.js")),
+];
+
+/// Size of a page: at least, at most, and for each second of the run \[bytes\].
+const PAGE_LEAST: f64 = 2.7e6;
+const PAGE_MOST: f64 = 11.7e6;
+const PAGE_PER_S: f64 = 4_300.0;
+/// What a page takes without data \[bytes\].
+const PAGE_EMPTY: f64 = 0.2e6;
+/// The part of the room that a run has at least, however long its program is.
+const RUN_SHARE_LEAST: f64 = 0.25;
+
+/// A run as a page shows it.
+#[derive(Clone, Debug)]
+pub struct PageRun {
+    data: Vec<u8>,
+    program: Option<Vec<u8>>,
+}
+
+#[derive(Serialize)]
+struct ProgramJson<'run> {
+    text: &'run str,
+    times: Vec<(&'run str, f64)>,
+}
+
+impl PageRun {
+    /// The data of a trace, in their own share of a page of the size that a run of this duration has.
+    ///
+    /// # Errors
+    /// Writing into memory fails.
+    pub fn of<const N: usize>(trace: &RunTrace<N>) -> io::Result<Self> {
+        Self::with_summary(trace, &Summary::of(trace))
+    }
+
+    pub(super) fn with_summary<const N: usize>(trace: &RunTrace<N>, summary: &Summary) -> io::Result<Self> {
+        let program = trace.source.as_ref().map(|source| {
+            let program = ProgramJson { text: &source.text, times: source.times.clone() };
+            data::of_text(&serde_json::to_vec(&program)?)
+        });
+        let program = program.transpose()?;
+        let page = (PAGE_PER_S * summary.executed_time_s).clamp(PAGE_LEAST, PAGE_MOST) - PAGE_EMPTY;
+        // Four characters of text are three bytes.
+        let room = 0.75 * page;
+        let text = program.as_ref().map_or(0, Vec::len) as f64;
+        let bytes_max = (room - text).max(RUN_SHARE_LEAST * room) as usize;
+        Ok(Self { data: data::of_run(trace, summary, bytes_max)?, program })
+    }
+}
+
+/// Writes the page of a run, `headline` first; with another run beside it, if there is one.
+pub(super) fn write<const N: usize>(
+    trace: &RunTrace<N>,
+    summary: &Summary,
+    headline: &str,
+    against: Option<&PageRun>,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    let run = PageRun::with_summary(trace, summary)?;
+    let runs = [("", Some(&run)), ("against-", against)];
+    let mut rest = INDEX;
+    // The template names what stands in its place.
+    while let Some((before, after)) = rest.split_once("{{") {
+        let (name, after) = after.split_once("}}").unwrap_or((after, ""));
+        out.write_all(before.as_bytes())?;
+        match name {
+            "title" => write!(out, "{}", escape(file_name(program_name(trace))))?,
+            "style" => write!(out, "{STYLE}{}", palette::variables())?,
+            "modules" => out.write_all(import_map().as_bytes())?,
+            "headline" => out.write_all(headline.as_bytes())?,
+            _ => {
+                for (role, run) in runs {
+                    let Some(run) = run else { continue };
+                    embed(&format!("{role}run"), &run.data, out)?;
+                    if let Some(program) = &run.program {
+                        embed(&format!("{role}program"), program, out)?;
+                    }
+                }
+            }
+        }
+        rest = after;
+    }
+    out.write_all(rest.as_bytes())
+}
+
+/// Every module under its name, as an address that holds its text.
+fn import_map() -> String {
+    let imports: serde_json::Map<String, serde_json::Value> = MODULES
+        .iter()
+        .map(|(name, text)| {
+            let address = format!("data:text/javascript;base64,{}", BASE64.encode(text));
+            ((*name).to_owned(), address.into())
+        })
+        .collect();
+    serde_json::json!({ "imports": imports }).to_string()
+}
+
+fn embed(name: &str, bytes: &[u8], out: &mut impl Write) -> io::Result<()> {
+    writeln!(out, "<script type=\"text/plain\" id=\"{name}\">{}</script>", BASE64.encode(bytes))
+}
+
+/// Pages, read as their script does.
+#[cfg(test)]
+pub(super) mod reading {
+    use std::io::Read as _;
+
+    use flate2::read::ZlibDecoder;
+    use serde_json::Value;
+
+    use super::*;
+
+    pub(in crate::report) struct Read {
+        pub(in crate::report) header: Value,
+        bytes: Vec<u8>,
+    }
+
+    impl Read {
+        /// An embedded text, inflated.
+        pub(in crate::report) fn text(page: &str, name: &str) -> Vec<u8> {
+            let start = format!("id=\"{name}\">");
+            let text =
+                page.split_once(&start).and_then(|(_, rest)| rest.split_once("</script>")).expect("data").0;
+            let mut inflated = Vec::new();
+            let bytes = BASE64.decode(text).expect("base64");
+            ZlibDecoder::new(&bytes[..]).read_to_end(&mut inflated).expect("a stream");
+            inflated
+        }
+
+        pub(in crate::report) fn of(page: &str, name: &str) -> Self {
+            let bytes = Self::text(page, name);
+            let (length, rest) = bytes.split_first_chunk().expect("a length");
+            let (header, bytes) = rest.split_at(u32::from_le_bytes(*length) as usize);
+            Self { header: serde_json::from_slice(header).expect("JSON"), bytes: bytes.to_vec() }
+        }
+
+        /// A column's values, and its step. What has no value is not a number.
+        pub(in crate::report) fn column(&self, name: &str) -> (Vec<f64>, f64) {
+            let columns = self.header["columns"].as_array().expect("a list");
+            let column = columns.iter().find(|column| column["name"] == name).expect("a column");
+            let step = column["step"].as_f64().expect("a number");
+            let value = |number| {
+                if number == i32::MAX || number == i32::MIN { f64::NAN } else { f64::from(number) * step }
+            };
+            (column::tests::read(&self.bytes, column).into_iter().map(value).collect(), step)
+        }
+    }
+}

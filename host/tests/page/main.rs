@@ -1,0 +1,53 @@
+//! The page in a browser: what it shows is what the run came to, and it answers pointers, wheel and keys.
+//!
+//! Needs `chromium` and `chromedriver`; without them every test is listed and ignored with the reason, but fails where
+//! `CI=true`. Work is counted, and no clock is read.
+
+mod browser;
+mod made_up;
+mod report;
+#[allow(dead_code, reason = "the suite uses the rest of it")]
+#[path = "../cli/workspace.rs"]
+mod workspace;
+
+use std::process::ExitCode;
+
+use libtest_mimic::{Arguments, Failed, Trial};
+
+const TESTS: [(&str, fn()); 13] = [
+    ("a_long_run_is_told_in_samples", made_up::a_long_run_is_told_in_samples),
+    ("pyramids_neither_lose_nor_invent_peaks", made_up::pyramids_neither_lose_nor_invent_peaks),
+    ("late_logs_with_gaps_and_rotary_axes_are_shown", made_up::late_logs_with_gaps_and_rotary_axes_are_shown),
+    ("figures_are_those_of_the_run", report::figures_are_those_of_the_run),
+    ("the_cursor_is_dragged", report::the_cursor_is_dragged),
+    ("the_wheel_zooms", report::the_wheel_zooms),
+    ("keys_move_cursor_and_window", report::keys_move_cursor_and_window),
+    ("colours_are_switched", report::colours_are_switched),
+    ("the_path_is_turned_and_pointed_at", report::the_path_is_turned_and_pointed_at),
+    ("worst_places_are_visited", report::worst_places_are_visited),
+    ("two_runs_lie_beside_each_other", report::two_runs_lie_beside_each_other),
+    ("faults_and_commands_are_marked", report::faults_and_commands_are_marked),
+    ("a_phone_shows_all_of_it", report::a_phone_shows_all_of_it),
+];
+
+fn main() -> ExitCode {
+    let arguments = Arguments::from_args();
+    let is_ci = std::env::var("CI").is_ok_and(|value| value == "true");
+    let reason = browser::missing();
+    let trial = |(name, test): (&'static str, fn())| {
+        let missing = reason.clone();
+        let run = move || match missing {
+            None => {
+                test();
+                Ok(())
+            }
+            Some(reason) => Err(Failed::from(reason)),
+        };
+        match &reason {
+            // The kind is what the harness prints next to the name.
+            Some(reason) if !is_ci => Trial::test(name, run).with_kind(reason).with_ignored_flag(true),
+            _ => Trial::test(name, run),
+        }
+    };
+    libtest_mimic::run(&arguments, TESTS.map(trial).into()).exit_code()
+}
