@@ -271,7 +271,7 @@ fn as_strong(by: f64) -> String {
         let value = line.split_once(" = ").and_then(|(key, value)| Some((key, value.parse::<f64>().ok()?)));
         let stronger = match value {
             Some((key @ ("mm_min_at_10_v" | "accel_limit_mm_s2"), value)) => Some((key, value * by)),
-            Some((key @ ("feed_mm_min" | "accel_mm_s2"), value)) => Some((key, value * by.min(1.0))),
+            Some((key @ ("feed_mm_s" | "accel_mm_s2"), value)) => Some((key, value * by.min(1.0))),
             _ => None,
         };
         match stronger {
@@ -353,6 +353,8 @@ fn drive_identifies_an_axis_from_what_was_recorded() {
     assert!(refusal.contains("bad.csv:3: found '0.0005,0,what', expected three finite numbers"), "{refusal}");
     let still: String = (0..100).map(|tick| format!("{},{},7\n", f64::from(tick) * 5e-4, tick % 2)).collect();
     workspace.put("still.csv", &format!("time_s,command_v,counts\n{still}"));
-    let refusal = workspace.refusal(&["drive", "identify", "--from", "still.csv"]);
+    let output = workspace.motion(&["drive", "identify", "--from", "still.csv"]);
+    assert_eq!(output.status.code(), Some(1));
+    let refusal = String::from_utf8_lossy(&output.stderr);
     assert!(refusal.contains("is the drive enabled, the encoder connected?"), "{refusal}");
 }

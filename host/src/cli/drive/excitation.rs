@@ -22,7 +22,8 @@ where it stands, within the limits of the machine file. Record what the converte
 tick by tick, from before its first motion until after its last: `motion drive identify --from` reads that.
 
 Steps of planned motion are as steep as the machine file's limits let them be. Gentle limits show less of the drive:
-dead time, command filter and current lag may not be told apart then, and the current limit is not reached.
+dead time, command filter and current lag may not be told apart then, and the current limit is not reached. Circles of less
+than 0.01 mm are left out.
 `motion drive identify` says what a recording did not show.
 
 Example:
@@ -32,6 +33,9 @@ Example:
 const REST_S: f64 = 0.3;
 /// The part of the axis' limits that circles take.
 const SHARE: f64 = 0.8;
+
+/// The least radius of a circle \[mm\]: programs have no smaller ones.
+const RADIUS_MM_MIN: f64 = 0.01;
 
 /// Write the G-code program whose run shows the drive of an axis.
 #[derive(Debug, Args)]
@@ -109,6 +113,9 @@ fn program(machine: &Machine, axis: usize) -> String {
                 let most_mm_s = feed_mm_s(&[first, second]).min(SHARE * pair_accel_mm_s2 / omega_per_s);
                 let feed_mm_s = amplitude_mm_s.min(SHARE * most_mm_s);
                 let radius_mm = feed_mm_s / omega_per_s;
+                if radius_mm < RADIUS_MM_MIN {
+                    continue;
+                }
                 for _ in 0..periods {
                     line(format!(
                         "G3 {}0 {}0 {offset}{:.6} F{:.3}",
