@@ -103,9 +103,10 @@ pub(super) fn floor(runs: &Runs, found: &Found, free: &[Unknown], substeps: u32)
     let (columns, residuals) = derivatives(runs, &found.unknowns, free, substeps)?;
     let mut information = runs.weights(Precision::LAST).sums(&columns, &residuals).normal;
     // What no run shows has no floor.
-    for index in 0..free.len() {
-        if information.at(index, index) < free[index].ignorance().powi(-2) {
-            *information.at_mut(index, index) = 1e12 * free[index].ignorance().powi(-2);
+    for (index, unknown) in free.iter().enumerate() {
+        let least = unknown.ignorance().powi(-2);
+        if information.at(index, index) < least {
+            *information.at_mut(index, index) = 1e12 * least;
         }
     }
     let scale: Vec<f64> = (0..free.len()).map(|index| information.at(index, index).sqrt().recip()).collect();

@@ -136,10 +136,10 @@ impl Model {
             demand[lane] = (next - velocity) / self.step_s;
         }
         if self.has_bed {
-            for lane in 0..LANES {
+            for (lane, pushed) in demand.iter().enumerate() {
                 let accel = -self.stiffness[lane] * state.bed[lane]
                     - self.damping[lane] * state.bed_velocity[lane]
-                    - self.mass_ratio[lane] * (demand[lane] + state.bed_accel[lane]);
+                    - self.mass_ratio[lane] * (pushed + state.bed_accel[lane]);
                 state.bed_accel[lane] = accel;
                 state.bed_velocity[lane] += self.step_s * accel;
                 state.bed[lane] += self.step_s * state.bed_velocity[lane];
