@@ -568,6 +568,6 @@ fn refusals_name_the_axis_and_its_unit() {
     let refused = plan_moves("test.ngc", vec![step], &machine, Mode::Spanning).map(|_| ());
     assert_eq!(
         refused.expect_err("too far").to_string(),
-        "test.ngc:3: found a path through C = 1500000 °, expected coordinates within ±1000000 °"
+        "test.ngc:3: found a path through C = 1500001 °, expected coordinates within ±1000000 °"
     );
 }
