@@ -16,7 +16,7 @@ export class Camera {
   constructor(runs) {
     this.runs = runs;
     this.size = [1, 1];
-    [this.yaw, this.pitch] = FROM_ABOVE;
+    this.lookFromAbove();
   }
 
   get isInSpace() {
@@ -35,7 +35,6 @@ export class Camera {
 
   /** Sees all of the path, in the plane or the space of these axes. */
   fit(axes, size) {
-    if (!this.isMoved) [this.yaw, this.pitch] = FROM_ABOVE;
     this.isMoved = false;
     this.axes = axes;
     this.size = size;
@@ -89,6 +88,11 @@ export class Camera {
     this.offset = [x, y].map((at, way) => at - this.size[way] / 2 - (at - this.size[way] / 2 - this.offset[way]) * by);
     this.scale = scale;
     this.isMoved = true;
+  }
+
+  /** Looks from the front, the right and above again. */
+  lookFromAbove() {
+    [this.yaw, this.pitch] = FROM_ABOVE;
   }
 
   /** Turns in space, up to where it looks from straight above or below. */

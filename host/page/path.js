@@ -74,6 +74,7 @@ export class PathView {
     if (views.length > 1) {
       group("View", views.map(([name]) => name), (i) => {
         this.view = views[i];
+        this.camera.lookFromAbove();
         this.fit();
         nextFrame(this.redraw);
       });

@@ -144,7 +144,7 @@ pub struct PathLimits {
 }
 
 /// One block of the plan.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TracedBlock {
     /// G-code line, from 1.
     pub line: u32,

@@ -25,7 +25,7 @@ use crate::simulate::jog::{Ended, Jogged, Keys, Press};
 const EXAMPLES: &str = "\
 Examples:
   motion jog X+20 Y-2.5               by an increment [mm; degrees for rotary axes]
-  motion jog X+20@300 --feed 3000       the key is released after 300 ticks
+  motion jog X+20@300 --feed 3000     the key is released after 300 ticks
   motion jog X+ X- --machine mine.toml
                                       from one soft limit, [axis.travel], to the other
   motion jog X+20 --trace jog.csv     every tick, for a spreadsheet

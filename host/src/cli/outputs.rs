@@ -141,10 +141,10 @@ impl Outputs {
         Ok(Self { trace, of_trace: of_trace.clone(), report, program: None, against: None })
     }
 
-    /// Where the rest of a command's output goes: nowhere, where the trace has standard output.
+    /// Where the rest of a command's output goes: to standard error, where the trace has standard output.
     pub(super) fn printed<'a>(&self, out: &'a mut dyn Write) -> Box<dyn Write + 'a> {
         match self.trace {
-            Some(TraceOutput::Standard(_)) => Box::new(io::sink()),
+            Some(TraceOutput::Standard(_)) => Box::new(io::stderr()),
             _ => Box::new(out),
         }
     }

@@ -76,7 +76,8 @@ pub struct RunArguments {
     record: Option<PathBuf>,
     /// Live control: commands at given moments, such as `2000:hold,1.3s:resume,N50:override=0.5`.
     ///
-    /// A moment is a tick (2000), a time from the start of the run (1.3s), or where motion on a program line begins (N50).
+    /// A moment is a tick (2000), a time from the start of the run (1.3s), or where motion on a line of
+    /// the program's file begins (N50: line 50, whatever its N word is).
     /// Each command waits for the one before it.
     ///
     /// A command is `hold` (come to rest on the path), `resume`, `abort` (come to rest and drop the rest of

@@ -11,7 +11,7 @@ use super::error::CliError;
 use crate::axis_unit::AxisUnit;
 use crate::files::STANDARD_INPUT;
 use crate::simulate::RunInfo;
-use crate::simulate::live::{Reached, When};
+use crate::simulate::live::{Due, When};
 use crate::trace::{AxisTick, TraceRow};
 
 /// Columns of the path, then seven of each axis that there is.
@@ -59,14 +59,15 @@ const fn axis_column(
 /// The trace that is asked for.
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct TraceArguments {
-    /// Write every tick as a row of CSV; an existing file is replaced. `-` is standard output, and nothing else is printed
-    /// there.
+    /// Write every tick as a row of CSV; an existing file is replaced. `-` is standard output; everything else
+    /// is then printed to standard error.
     #[arg(long, value_name = "FILE.csv")]
     pub(super) trace: Option<PathBuf>,
     /// Columns of --trace in their order, by name, such as `t_s,X_err_um`. Without it, all.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "trace")]
     columns: Vec<String>,
-    /// The first tick of --trace: a tick (2000), a time (1.5s), or where a program line begins (N50).
+    /// The first tick of --trace: a tick (2000), a time (1.5s), or where motion on a line of the
+    /// program's file begins (N50: line 50).
     #[arg(long, value_name = "WHEN", value_parser = when, requires = "trace")]
     from: Option<When>,
     /// The last tick of --trace, likewise.
@@ -79,7 +80,7 @@ pub(super) struct TraceArguments {
 
 fn when(text: &str) -> Result<When, String> {
     text.parse().map_err(|()| {
-        format!("found `{text}`, expected a tick such as 2000, a time such as 1.5s, or a line such as N50")
+        format!("found `{text}`, expected a tick such as 2000, a time such as 1.5s, or a line of the file such as N50")
     })
 }
 
@@ -104,12 +105,9 @@ impl TraceArguments {
         } else {
             self.columns.iter().map(place).collect::<Result<_, _>>()?
         };
-        let ticks = Ticks {
-            from: self.from,
-            to: self.to,
-            every: self.every.map_or(1, NonZeroU64::get),
-            ..Ticks::ALL
-        };
+        let due = |when: Option<When>| when.map(|when| when.due(info));
+        let every = self.every.map_or(1, NonZeroU64::get);
+        let ticks = Ticks { from: due(self.from), to: due(self.to), every, ..Ticks::ALL };
         Ok(Selection { columns, ticks })
     }
 }
@@ -131,24 +129,20 @@ impl Selection {
 /// Which ticks are written.
 #[derive(Clone, Copy, Debug)]
 struct Ticks {
-    from: Option<When>,
-    to: Option<When>,
+    from: Option<Due>,
+    to: Option<Due>,
     every: u64,
     /// The first one that was; whether the last one was.
     first: Option<u64>,
     is_over: bool,
-    /// The program line of the tick before.
-    line: u32,
 }
 
 impl Ticks {
-    const ALL: Self = Self { from: None, to: None, every: 1, first: None, is_over: false, line: 0 };
+    const ALL: Self = Self { from: None, to: None, every: 1, first: None, is_over: false };
 
     /// Whether a tick is written.
-    fn takes(&mut self, tick: u64, line: u32, tick_s: f64) -> bool {
-        let reached = Reached { tick, lines: [line, self.line] };
-        self.line = line;
-        let is_reached = |when: Option<When>| when.is_some_and(|when| when.is_reached(reached, tick_s));
+    fn takes(&mut self, tick: u64, s_mm: f64) -> bool {
+        let is_reached = |due: Option<Due>| due.is_some_and(|due| due.is_reached(tick, s_mm));
         if self.first.is_none() && (self.from.is_none() || is_reached(self.from)) {
             self.first = Some(tick);
         }
@@ -190,7 +184,7 @@ impl<W: Write> TraceWriter<W> {
 
     /// Adds a row, or keeps its failure.
     pub(super) fn add<const N: usize>(&mut self, tick: &TraceRow<N>) {
-        if self.failure.is_none() && self.selection.ticks.takes(tick.tick, tick.line, self.tick_s) {
+        if self.failure.is_none() && self.selection.ticks.takes(tick.tick, tick.s_mm) {
             self.failure = self.row(tick).err();
         }
     }

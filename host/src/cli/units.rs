@@ -32,7 +32,7 @@ impl<T: Serialize> Serialize for InUnit<T> {
     }
 }
 
-/// A feed of the command line, per second: a number is per minute, as in programs, unless it carries its unit.
+/// A feed that is asked for, per second: a number is per minute, as in programs, unless it carries its unit.
 pub(super) fn feed_per_s(text: &str) -> Result<f64, String> {
     let per_s = [("mm/s", 1.0), ("deg/s", 1.0), ("°/s", 1.0)];
     let per_min = [("mm/min", 60.0), ("deg/min", 60.0), ("°/min", 60.0), ("", 60.0)];

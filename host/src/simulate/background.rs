@@ -12,7 +12,8 @@ use motion_kernel::program::{Item, Supply, SupplyError, Switching};
 use motion_kernel::queue::{Feeder, Intake, LiveFeeder, LiveStreams, PathRules, Streams};
 use motion_kernel::units::Position;
 
-use super::live::{Command, Reached, Script};
+use super::job::RunInfo;
+use super::live::{Command, Due, Script};
 use super::switches::Switches;
 use crate::trace::{HeldBy, RunEnd};
 
@@ -27,7 +28,7 @@ const PLACES: usize = LIVE_PIECES;
 /// The memory of the streams.
 pub(super) enum Storage<'script, R: Real, const N: usize> {
     Plain(Box<Streams<R, N, PIECES, SEGMENTS>>),
-    Live(Box<LiveStreams<R, N, LIVE_PIECES, LIVE_SEGMENTS>>, &'script Script),
+    Live(Box<LiveStreams<R, N, LIVE_PIECES, LIVE_SEGMENTS>>, &'script Script, Vec<Due>),
 }
 
 /// What fills them.
@@ -44,7 +45,8 @@ pub(super) struct Live<'a, R: Real, I, const N: usize> {
     feeder: LiveFeeder<'a, R, N>,
     control: LiveControl<R, N, Switching<I>, Infallible, PLACES>,
     script: &'a Script,
-    tick_s: f64,
+    /// When its commands are due.
+    due: Vec<Due>,
     /// Commands given so far.
     given: usize,
     /// Whether the latest of hold and resume was a hold.
@@ -53,10 +55,10 @@ pub(super) struct Live<'a, R: Real, I, const N: usize> {
 
 impl<'script, R: Real, const N: usize> Storage<'script, R, N> {
     /// For a run under live control, if there is a script.
-    pub(super) fn new(script: Option<&'script Script>) -> Self {
+    pub(super) fn new(script: Option<&'script Script>, info: &RunInfo) -> Self {
         match script {
             None => Self::Plain(Box::default()),
-            Some(script) => Self::Live(Box::default(), script),
+            Some(script) => Self::Live(Box::default(), script, script.due(info)),
         }
     }
 
@@ -75,11 +77,12 @@ impl<'script, R: Real, const N: usize> Storage<'script, R, N> {
                 feeder.bound(travel);
                 (Background::Plain(Box::new((feeder, Supply::new(items, tick_s)))), intake)
             }
-            Self::Live(streams, script) => {
+            Self::Live(streams, script, due) => {
                 let (mut feeder, intake) = streams.split(rules, start);
                 feeder.bound(travel);
                 let control = LiveControl::new(items, pulse, tick_s, Leads::NONE);
-                let live = Live { feeder, control, script, tick_s, given: 0, is_on_hold: false };
+                let due = due.clone();
+                let live = Live { feeder, control, script, due, given: 0, is_on_hold: false };
                 (Background::Live(Box::new(live)), intake)
             }
         }
@@ -87,14 +90,13 @@ impl<'script, R: Real, const N: usize> Storage<'script, R, N> {
 }
 
 impl<R: Real, I: Iterator<Item = Result<Item<N>, Infallible>>, const N: usize> Background<'_, R, I, N> {
-    /// Before a tick; the one before ended in `state`.
+    /// Before a tick; the one before ended in `state`, so far along the path \[mm\].
     pub(super) fn poll(
         &mut self,
-        reached: Reached,
+        (tick, s_mm): (u64, f64),
         state: ExecState,
         (switches, hardware): (&mut Switches<'_>, &mut impl Outputs),
     ) -> Result<(), SupplyError<Infallible>> {
-        let tick = reached.tick;
         match self {
             Self::Plain(plain) => {
                 let (feeder, supply) = &mut **plain;
@@ -109,9 +111,9 @@ impl<R: Real, I: Iterator<Item = Result<Item<N>, Infallible>>, const N: usize> B
                 supply.fill(feeder)
             }
             Self::Live(live) => {
-                let Live { feeder, control, script, tick_s, given, is_on_hold } = &mut **live;
+                let Live { feeder, control, script, due, given, is_on_hold } = &mut **live;
                 while let Some(timed) = script.commands().get(*given)
-                    && timed.when.is_reached(reached, *tick_s)
+                    && due.get(*given).is_some_and(|due| due.is_reached(tick, s_mm))
                 {
                     match timed.command {
                         Command::Hold => *is_on_hold = true,

@@ -3,13 +3,16 @@
 //! Consumes a script and the executed ticks; produces a [`TracedCommand`] for each command that was given,
 //! with the rest that it led to.
 
-use super::live::{Command, Reached, Script, Timed};
+use super::job::RunInfo;
+use super::live::{Command, Due, Script, Timed};
 use crate::trace::{TraceRow, TracedCommand, TracedStop};
 
 /// Follows the ticks.
 #[derive(Debug, Default)]
 pub(super) struct Commands<'run> {
     ahead: &'run [Timed],
+    /// When they are due, the next one last.
+    due: Vec<Due>,
     records: Vec<TracedCommand>,
     /// Commands that wait for a rest, with their index in the records.
     waiting: Vec<(usize, Command)>,
@@ -21,14 +24,17 @@ pub(super) struct Commands<'run> {
 }
 
 impl<'run> Commands<'run> {
-    pub(super) fn new(script: Option<&'run Script>, tick_s: f64) -> Self {
-        Self { ahead: script.map_or(&[], Script::commands), tick_s, ..Self::default() }
+    pub(super) fn new(script: Option<&'run Script>, info: &RunInfo) -> Self {
+        let due = script.map(|script| script.due(info)).into_iter().flatten().rev().collect();
+        let ahead = script.map_or(&[][..], Script::commands);
+        Self { ahead, due, tick_s: info.tick_s, ..Self::default() }
     }
 
-    /// Takes a tick; the run had reached `reached` before it.
-    pub(super) fn add<const N: usize>(&mut self, reached: Reached, tick: &TraceRow<N>) {
+    pub(super) fn add<const N: usize>(&mut self, tick: &TraceRow<N>) {
+        // As the background saw it, before the tick.
+        let (_, s_mm) = self.latest;
         while let [next, ahead @ ..] = self.ahead
-            && next.when.is_reached(reached, self.tick_s)
+            && self.due.pop_if(|due| due.is_reached(tick.tick, s_mm)).is_some()
         {
             self.ahead = ahead;
             self.give(tick.tick, next.command);
@@ -114,26 +120,23 @@ mod tests {
     /// Ticks of 1 ms with these feeds; the path grows by a hundredth of the feed.
     fn records(script: &str, feeds_mm_s: &[f64]) -> Vec<TracedCommand> {
         let script: Script = script.parse().expect("a script");
-        let mut commands = Commands::new(Some(&script), 1e-3);
+        let info = RunInfo { tick_s: 1e-3, ..RunInfo::default() };
+        let mut commands = Commands::new(Some(&script), &info);
         let mut s_mm = 0.0;
         for (tick, &v_mm_s) in feeds_mm_s.iter().enumerate() {
             s_mm += 0.01 * v_mm_s;
-            let reached = Reached { tick: tick as u64, lines: [0; 2] };
-            commands.add(
-                reached,
-                &TraceRow {
-                    tick: tick as u64,
-                    s_mm,
-                    v_mm_s,
-                    a_mm_s2: 0.0,
-                    j_mm_s3: 0.0,
-                    snap_mm_s4: 0.0,
-                    state: "moving",
-                    line: 0,
-                    contour_um: 0.0,
-                    axes: [AxisTick::default(); 3],
-                },
-            );
+            commands.add(&TraceRow {
+                tick: tick as u64,
+                s_mm,
+                v_mm_s,
+                a_mm_s2: 0.0,
+                j_mm_s3: 0.0,
+                snap_mm_s4: 0.0,
+                state: "moving",
+                line: 0,
+                contour_um: 0.0,
+                axes: [AxisTick::default(); 3],
+            });
         }
         commands.finish().0
     }

@@ -1,7 +1,7 @@
 //! Live control of a run: commands before given ticks, at given times, or where given program lines begin.
 //!
 //! As text `WHEN:COMMAND,WHEN:COMMAND,…`, in the order in which they are given: each waits for the one before it. When is
-//! a tick (`2000`), a time from the start of the run (`1.5s`), or a program line (`N50`); commands are `hold`, `resume`,
+//! a tick (`2000`), a time from the start of the run (`1.5s`), or a line of the program's file (`N50`: line 50, whatever its N word is); commands are `hold`, `resume`,
 //! `abort`, `override=SHARE`, `single` and `continuous`. A script displays as the text it is read from.
 
 use std::fmt;
@@ -9,6 +9,8 @@ use std::str::FromStr;
 
 use motion_kernel::live::{OVERRIDE_MAX, OVERRIDE_MIN};
 use serde::{Deserialize, Serialize};
+
+use super::job::RunInfo;
 
 /// What is commanded.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,30 +34,50 @@ pub enum When {
     Tick(u64),
     /// At this time from the start of the run \[s\]: before the first tick that begins no earlier.
     Time(f64),
-    /// Before the second tick of motion on this program line, or on the first one behind it where it has none of a tick's
-    /// length.
+    /// Where motion on this line of the program's file begins, or on the next line with motion.
     Line(u32),
 }
 
-/// How far a run is, before its next tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Reached {
-    /// The next tick.
-    pub tick: u64,
-    /// The program line of motion in the last tick, and in the one before; 0: at rest.
-    pub lines: [u32; 2],
+/// When a command is due in a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Due {
+    /// Before this tick.
+    Tick(u64),
+    /// Once motion has come so far along the path \[mm\].
+    Position(f64),
+    /// There is no motion on its line, nor behind it.
+    Never,
 }
 
+/// Positions are rounded by less \[mm\].
+const ROUNDING_MM: f64 = 1e-6;
+
 impl When {
-    /// Whether a run of ticks of `tick_s` is there.
+    /// When that is in a run of `info`.
     #[must_use]
-    pub fn is_reached(self, reached: Reached, tick_s: f64) -> bool {
-        let Reached { tick, lines: [line, before] } = reached;
+    pub fn due(self, info: &RunInfo) -> Due {
+        match self {
+            Self::Tick(tick) => Due::Tick(tick),
+            // Times in decimals and ticks in binary fractions of a second meet within less than a millionth of a tick.
+            Self::Time(time_s) => Due::Tick((time_s / info.tick_s - 1e-6).ceil().max(0.0) as u64),
+            Self::Line(line) => {
+                let behind = info.blocks.iter().filter(|block| block.line >= line);
+                // The first of its blocks: a line may be driven more than once.
+                let first = behind.min_by_key(|block| block.line);
+                first.map_or(Due::Never, |block| Due::Position(block.start_mm))
+            }
+        }
+    }
+}
+
+impl Due {
+    /// Whether a run is there before the tick `tick`, `s_mm` along the path.
+    #[must_use]
+    pub fn is_reached(self, tick: u64, s_mm: f64) -> bool {
         match self {
             Self::Tick(at) => at <= tick,
-            // Times in decimals and ticks in binary fractions of a second meet within less than a millionth of a tick.
-            Self::Time(at_s) => at_s <= (tick as f64 + 1e-6) * tick_s,
-            Self::Line(at) => line == at || before > 0 && before < at && at < line,
+            Self::Position(at_mm) => at_mm <= s_mm + ROUNDING_MM,
+            Self::Never => false,
         }
     }
 }
@@ -79,6 +101,11 @@ impl Script {
     #[must_use]
     pub fn commands(&self) -> &[Timed] {
         &self.0
+    }
+
+    /// When each of them is due in a run of `info`.
+    pub(super) fn due(&self, info: &RunInfo) -> Vec<Due> {
+        self.0.iter().map(|timed| timed.when.due(info)).collect()
     }
 }
 
@@ -158,7 +185,7 @@ impl TryFrom<String> for Script {
 pub enum ScriptError {
     /// A part has no colon, or nothing before it that says when.
     #[error(
-        "found `{0}`, expected WHEN:COMMAND such as 2000:hold (before a tick), 1.5s:hold or N50:hold (a line)"
+        "found `{0}`, expected WHEN:COMMAND such as 2000:hold (before a tick), 1.5s:hold or N50:hold (line 50 of the file)"
     )]
     When(String),
     /// A command is not known.
@@ -215,6 +242,7 @@ impl FromStr for Script {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::trace::TracedBlock;
 
     #[test]
     fn a_script_is_read_or_says_what_is_wrong() {
@@ -240,7 +268,7 @@ mod tests {
         for script in [script, third, Script::default()] {
             assert_eq!(Script::try_from(script.to_string()), Ok(script));
         }
-        let when = "expected WHEN:COMMAND such as 2000:hold (before a tick), 1.5s:hold or N50:hold (a line)";
+        let when = "expected WHEN:COMMAND such as 2000:hold (before a tick), 1.5s:hold or N50:hold (line 50 of the file)";
         for text in ["hold", "", "-1:hold", "1.5:hold", "-1s:hold", "nans:hold", "N0:hold", "N:hold"] {
             assert_eq!(
                 text.parse::<Script>().expect_err(text).to_string(),
@@ -262,17 +290,33 @@ mod tests {
     }
     #[test]
     fn a_command_is_due_once_its_place_is_reached() {
-        let is_reached = |when: &str, tick: u64, lines: [u32; 2]| {
-            when.parse::<When>().expect(when).is_reached(Reached { tick, lines }, 5e-4)
-        };
-        assert!(!is_reached("7", 6, [0; 2]) && is_reached("7", 7, [0; 2]));
-        // 0.3 s are tick 600, though 600 · 0.0005 is a little less in binary.
-        assert!(!is_reached("0.3s", 599, [0; 2]) && is_reached("0.3s", 600, [0; 2]));
-        assert!(!is_reached("0.3001s", 600, [0; 2]) && is_reached("0.3001s", 601, [0; 2]));
-        assert!(is_reached("N5", 0, [5, 4]) && is_reached("N5", 0, [5, 5]) && !is_reached("N5", 0, [4, 3]));
-        // Passed within a tick; a start behind it is no passing.
-        assert!(is_reached("N5", 0, [6, 4]) && !is_reached("N5", 0, [6, 0]) && !is_reached("N5", 0, [6, 6]));
-        // A subroutine that stands before its call.
-        assert!(!is_reached("N5", 0, [3, 30]) && is_reached("N5", 0, [5, 30]));
+        let block = |line: u32, start_mm: f64| TracedBlock { line, start_mm, ..TracedBlock::default() };
+        // A subroutine on lines 2 and 3 that is called twice, another one on line 6, and the main program from line 8 on.
+        let blocks = vec![
+            block(2, 0.0),
+            block(3, 10.0),
+            block(9, 20.0),
+            block(2, 30.0),
+            block(3, 40.0),
+            block(6, 50.0),
+        ];
+        let info = RunInfo { tick_s: 5e-4, blocks, ..RunInfo::default() };
+        let due = |when: &str| when.parse::<When>().expect(when).due(&info);
+        assert_eq!(due("7"), Due::Tick(7));
+        // 600 · 0.0005 is a little less than 0.3 in binary.
+        assert_eq!((due("0.3s"), due("0.3001s"), due("0s")), (Due::Tick(600), Due::Tick(601), Due::Tick(0)));
+        assert_eq!(
+            (due("N3"), due("N6"), due("N9")),
+            (Due::Position(10.0), Due::Position(50.0), Due::Position(20.0))
+        );
+        // Lines without motion, and one behind the last.
+        assert_eq!(
+            (due("N5"), due("N8"), due("N10")),
+            (Due::Position(50.0), Due::Position(20.0), Due::Never)
+        );
+        assert!(!due("7").is_reached(6, 1e9) && due("7").is_reached(7, 0.0));
+        assert!(
+            !due("N3").is_reached(9, 9.99) && due("N3").is_reached(9, 10.0) && !due("N10").is_reached(9, 1e9)
+        );
     }
 }

@@ -20,7 +20,6 @@ use super::hardware::{Hardware, SimulatedHardware, simulated};
 use super::inject::Injections;
 use super::job::{Job, Number, RunOptions, StretchCorrection};
 use super::limit_share::LimitShare;
-use super::live::Reached;
 use super::probing::{Probed, Probing};
 use super::summary::{AxisSummary, Collector, RunSummary};
 use super::switches::Switches;
@@ -105,7 +104,7 @@ fn run_in<R: Real, const N: usize>(
         .flat_map(|correction| &correction.knots_mm_s)
         .map(|knot| core::array::from_fn(|axis| of_axis(knot, axis)))
         .collect();
-    let mut storage = Storage::<R, N>::new(script.as_ref());
+    let mut storage = Storage::<R, N>::new(script.as_ref(), info);
     let items = job.items.iter().map(|&item| Ok(item));
     let (mut background, intake) =
         storage.split(header.rules, (header.start, job.guards.travel()), items, (header.pulse, tick_s));
@@ -126,16 +125,17 @@ fn run_in<R: Real, const N: usize>(
     let mut contour = Contour::new(info.linear_places());
     let mut limit_share = LimitShare::new(info);
     let mut probing = Probing::new(info);
-    let mut commands = Commands::new(script.as_ref(), tick_s);
+    let mut commands = Commands::new(script.as_ref(), info);
     let mut switches = Switches::new(&info.switch_lines);
     let (mut stops, mut stopped_ticks) = (0_u64, 0_u64);
     let mut state = ExecState::Idle;
     let mut goes_on = true;
     summary.end = RunEnd::Cut;
-    let mut lines = [0; 2];
+    let mut s_mm = 0.0;
     while goes_on {
-        let reached = Reached { tick: collector.ticks(), lines };
-        background.poll(reached, state, (&mut switches, hardware)).map_err(RunError::Rejected)?;
+        background
+            .poll((collector.ticks(), s_mm), state, (&mut switches, hardware))
+            .map_err(RunError::Rejected)?;
         let was_idle = state == ExecState::Idle;
         let trace = *kernel.tick_corrected(&mut intake, hardware);
         goes_on = hardware.advance(&trace);
@@ -151,8 +151,8 @@ fn run_in<R: Real, const N: usize>(
         collector.add(&row);
         limit_share.add(&row);
         probing.tick(&trace);
-        commands.add(reached, &row);
-        lines = [row.line, lines[0]];
+        commands.add(&row);
+        s_mm = row.s_mm;
         observe(&row);
         if let Some(fault) = trace.fault {
             summary.end = RunEnd::Faulted;

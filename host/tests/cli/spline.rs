@@ -50,7 +50,9 @@ fn spline_runs_points() {
     }
     let page = workspace.read("run.html");
     assert!(
-        page.contains("Done without a fault") && page.contains("spline of degree 5") && page.trim_end().ends_with("</html>")
+        page.contains("Done without a fault")
+            && page.contains("spline of degree 5")
+            && page.trim_end().ends_with("</html>")
     );
     assert!(workspace.read("run.csv").starts_with("tick,t_s,s_mm,"));
 }

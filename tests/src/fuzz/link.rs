@@ -421,7 +421,12 @@ impl Bench {
             }
             (before, waited_ms) = (self.items.taken(), 0);
         }
-        assert!(self.host.is_controlled() || self.controls.number != self.host.controls().number);
+        // What was taken came after the newest controls, or they are said again.
+        for _ in 0..1000 {
+            self.turn();
+        }
+        assert_eq!(self.controls.number, self.host.controls().number, "the newest controls do not get there");
+        assert!(self.host.is_controlled());
     }
 }
 
