@@ -219,10 +219,13 @@ impl Outputs {
     }
 }
 
+/// The name of a trace's file, and what tells of a failure there.
+type TraceFile = (String, Failure);
+
 /// The ticks of a run. Only a report needs all of them at once.
 pub(super) struct Ticks<const N: usize> {
-    /// With its file's name, and what tells of a failure there.
-    trace: Option<(Option<(String, Failure)>, TraceWriter<TraceOutput>)>,
+    /// With the file that it is written to, if it is.
+    trace: Option<(Option<TraceFile>, TraceWriter<TraceOutput>)>,
     report: Option<OutputFile>,
     against: Option<PageRun>,
     ticks: Vec<TraceRow<N>>,

@@ -195,7 +195,7 @@ mod tests {
             ["a.ngc:1:1: found UTF-16 text, expected UTF-8 or ASCII: save the program in one of these"];
         assert_eq!(said(b""), empty);
         assert_eq!(said(b" \r\n\n"), empty);
-        for text in [&b"\xFF\xFEG\0001\0\n\0"[..], b"\xFE\xFF\0G\0001", b"G\0001\0", b"\0G\0001"] {
+        for text in [&b"\xFF\xFEG\x001\x00"[..], b"\xFE\xFF\x00G\x001", b"G\x001\x00", b"\x00G\x001"] {
             assert_eq!(said(text), wide, "{text:?}");
         }
         // Bytes that are neither are told one by one.
