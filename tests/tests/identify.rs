@@ -298,13 +298,10 @@ fn a_lead_in_covers_what_was_before_the_recording() {
     }
     let case = case("Y cut", REFERENCE_Y, SETUP);
     let found = identify(&runs).expect("a result");
-    for ((deviation, half_width), Column { name, limit }) in
-        deviations(&case, &found.parameters).iter().zip(&COLUMNS)
+    for ((deviation, _), Column { name, limit }) in deviations(&case, &found.parameters).iter().zip(&COLUMNS)
     {
-        println!("{name:>10}: {deviation:.3} ± {half_width:.3}");
-        // Half of the readings say less, and the interval tells.
-        let limit = limit.max(*half_width);
-        assert!(deviation.abs() <= limit, "{name}: {deviation}, expected at most {limit}");
+        println!("{name:>10}: {deviation:.3}");
+        assert!(deviation.abs() <= *limit, "{name}: {deviation}, expected at most {limit}");
     }
 }
 
