@@ -168,8 +168,6 @@ export class Plots {
     area.addEventListener("pointerleave", () => drag || state.leave());
     area.addEventListener("dblclick", () => state.showAll());
     area.addEventListener("wheel", (event) => this.wheel(event, x(event)), { passive: false });
-    // Also where the page began to scroll elsewhere.
-    window.addEventListener("scroll", () => { this.scrolledAt = performance.now(); }, { passive: true });
   }
 
   /** Zooms, or moves the window where the wheel goes sideways. A page that scrolls already goes on scrolling. */
