@@ -146,6 +146,14 @@ impl<R: Real, I: Iterator<Item = Result<Item<N>, Infallible>>, const N: usize> B
         }
     }
 
+    /// How many commands of the script were given.
+    pub(super) fn given(&self) -> usize {
+        match self {
+            Self::Plain(_) => 0,
+            Self::Live(live) => live.given,
+        }
+    }
+
     /// How the run ends with a tick that ended in `state`, if it does: no item is left, or no command to
     /// resume.
     pub(super) fn ended(&self, state: ExecState) -> Option<RunEnd> {

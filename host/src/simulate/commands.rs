@@ -3,16 +3,13 @@
 //! Consumes a script and the executed ticks; produces a [`TracedCommand`] for each command that was given,
 //! with the rest that it led to.
 
-use super::job::RunInfo;
-use super::live::{Command, Due, Script, Timed};
+use super::live::{Command, Script, Timed};
 use crate::trace::{TraceRow, TracedCommand, TracedStop};
 
 /// Follows the ticks.
 #[derive(Debug, Default)]
 pub(super) struct Commands<'run> {
     ahead: &'run [Timed],
-    /// When they are due, the next one last.
-    due: Vec<Due>,
     records: Vec<TracedCommand>,
     /// Commands that wait for a rest, with their index in the records.
     waiting: Vec<(usize, Command)>,
@@ -24,17 +21,14 @@ pub(super) struct Commands<'run> {
 }
 
 impl<'run> Commands<'run> {
-    pub(super) fn new(script: Option<&'run Script>, info: &RunInfo) -> Self {
-        let due = script.map(|script| script.due(info)).into_iter().flatten().rev().collect();
-        let ahead = script.map_or(&[][..], Script::commands);
-        Self { ahead, due, tick_s: info.tick_s, ..Self::default() }
+    pub(super) fn new(script: Option<&'run Script>, tick_s: f64) -> Self {
+        Self { ahead: script.map_or(&[], Script::commands), tick_s, ..Self::default() }
     }
 
-    pub(super) fn add<const N: usize>(&mut self, tick: &TraceRow<N>) {
-        // As the background saw it, before the tick.
-        let (_, s_mm) = self.latest;
+    /// Takes a tick, before which so many commands were given in all.
+    pub(super) fn add<const N: usize>(&mut self, given: usize, tick: &TraceRow<N>) {
         while let [next, ahead @ ..] = self.ahead
-            && self.due.pop_if(|due| due.is_reached(tick.tick, s_mm)).is_some()
+            && self.records.len() < given
         {
             self.ahead = ahead;
             self.give(tick.tick, next.command);
@@ -115,17 +109,20 @@ fn is_ended_by(waiting: Command, command: Command) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simulate::RunInfo;
     use crate::trace::AxisTick;
 
     /// Ticks of 1 ms with these feeds; the path grows by a hundredth of the feed.
     fn records(script: &str, feeds_mm_s: &[f64]) -> Vec<TracedCommand> {
         let script: Script = script.parse().expect("a script");
         let info = RunInfo { tick_s: 1e-3, ..RunInfo::default() };
-        let mut commands = Commands::new(Some(&script), &info);
+        let due = script.due(&info);
+        let mut commands = Commands::new(Some(&script), info.tick_s);
         let mut s_mm = 0.0;
         for (tick, &v_mm_s) in feeds_mm_s.iter().enumerate() {
             s_mm += 0.01 * v_mm_s;
-            commands.add(&TraceRow {
+            let given = due.iter().filter(|due| due.is_reached(tick as u64, 0.0)).count();
+            let row = TraceRow {
                 tick: tick as u64,
                 s_mm,
                 v_mm_s,
@@ -136,7 +133,8 @@ mod tests {
                 line: 0,
                 contour_um: 0.0,
                 axes: [AxisTick::default(); 3],
-            });
+            };
+            commands.add(given, &row);
         }
         commands.finish().0
     }

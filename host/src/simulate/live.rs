@@ -1,8 +1,9 @@
 //! Live control of a run: commands before given ticks, at given times, or where given program lines begin.
 //!
 //! As text `WHEN:COMMAND,WHEN:COMMAND,…`, in the order in which they are given: each waits for the one before it. When is
-//! a tick (`2000`), a time from the start of the run (`1.5s`), or a line of the program's file (`N50`: line 50, whatever its N word is); commands are `hold`, `resume`,
-//! `abort`, `override=SHARE`, `single` and `continuous`. A script displays as the text it is read from.
+//! a tick (`2000`), a time from the start of the run (`1.5s`), or a line of the program's file (`N50`: line 50, whatever its
+//! N word is); commands are `hold`, `resume`, `abort`, `override=SHARE`, `single` and `continuous`. A script displays as the
+//! text it is read from.
 
 use std::fmt;
 use std::str::FromStr;
@@ -288,6 +289,7 @@ mod tests {
             assert_eq!(text.parse::<Script>().expect_err(text).to_string(), message);
         }
     }
+
     #[test]
     fn a_command_is_due_once_its_place_is_reached() {
         let block = |line: u32, start_mm: f64| TracedBlock { line, start_mm, ..TracedBlock::default() };

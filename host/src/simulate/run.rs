@@ -125,7 +125,7 @@ fn run_in<R: Real, const N: usize>(
     let mut contour = Contour::new(info.linear_places());
     let mut limit_share = LimitShare::new(info);
     let mut probing = Probing::new(info);
-    let mut commands = Commands::new(script.as_ref(), info);
+    let mut commands = Commands::new(script.as_ref(), tick_s);
     let mut switches = Switches::new(&info.switch_lines);
     let (mut stops, mut stopped_ticks) = (0_u64, 0_u64);
     let mut state = ExecState::Idle;
@@ -151,7 +151,7 @@ fn run_in<R: Real, const N: usize>(
         collector.add(&row);
         limit_share.add(&row);
         probing.tick(&trace);
-        commands.add(&row);
+        commands.add(background.given(), &row);
         s_mm = row.s_mm;
         observe(&row);
         if let Some(fault) = trace.fault {
