@@ -204,6 +204,16 @@ fn unplannable(error: &PlanError) -> String {
     }
 }
 
+/// A problem that names the axis that it is about.
+pub(super) fn named<const N: usize>(problem: Problem, axes: &[Option<Axis>; N]) -> Problem {
+    match problem {
+        Problem::Geometry(CompileError::Coordinate { axis: place, mm: found }) => {
+            axes.get(place).copied().flatten().map_or(problem, |axis| Problem::Coordinate { axis, found })
+        }
+        problem => problem,
+    }
+}
+
 fn unmade(error: &SegmentError, tick_s: f64) -> String {
     match *error {
         // The kernel's quantities carry their units: "t1 [s]".

@@ -16,11 +16,11 @@ use motion_kernel::units::Position;
 
 use super::ceilings::few_digits;
 use super::density::{PiecePace, SegmentPace};
-use super::error::{AtLine, Problem};
+use super::error::{AtLine, Problem, named};
 use super::profile::{PlacedRamp, ROUNDING_MM};
 use super::stretch::StretchBlock;
 use crate::gcode::Axis;
-use crate::toolpath::{CompileError, Placed, compile, exact, on_path};
+use crate::toolpath::{Placed, compile, exact, on_path};
 
 /// Blocks with equal ceilings that become one at most. So the wait for the next one is bounded.
 const MERGED_MAX: u32 = 256;
@@ -313,15 +313,5 @@ impl<const N: usize> Open<N> {
     fn line_at(&self, at: Position) -> u32 {
         let index = self.pieces.partition_point(|piece| piece.end <= at);
         self.pieces.get(index).map_or(self.line, |piece| piece.line)
-    }
-}
-
-/// A problem that names the axis that it is about.
-pub(super) fn named<const N: usize>(problem: Problem, axes: &[Option<Axis>; N]) -> Problem {
-    match problem {
-        Problem::Geometry(CompileError::Coordinate { axis: place, mm: found }) => {
-            axes.get(place).copied().flatten().map_or(problem, |axis| Problem::Coordinate { axis, found })
-        }
-        problem => problem,
     }
 }

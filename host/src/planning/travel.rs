@@ -6,8 +6,7 @@
 use motion_kernel::path::Piece;
 use motion_kernel::program::Item;
 
-use super::error::{AtLine, Problem};
-use super::items::named;
+use super::error::{AtLine, Problem, named};
 use crate::axis_unit::AxisUnit;
 use crate::machine::{AxisSettings, Machine};
 use crate::toolpath::{Element, Vector, add, exact};
