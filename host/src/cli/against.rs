@@ -3,9 +3,9 @@
 use std::path::Path;
 
 use super::error::CliError;
-use super::input::{self, ReadingArguments, Source};
+use super::input::{self, Source};
 use super::outputs::{trace_of, traced};
-use crate::gcode::AXES_MAX;
+use crate::gcode::{AXES_MAX, ReadOptions};
 use crate::machine::Machine;
 use crate::planning::{Mode, plan_program};
 use crate::recording::{self, Recording};
@@ -19,7 +19,7 @@ use crate::trace::{RunTrace, TracedProgram};
 /// The file is refused, there is no plan, or it can't be run.
 pub(super) fn run<const N: usize>(
     path: &Path,
-    reading: &ReadingArguments,
+    options: &ReadOptions,
     machine: &Machine<N>,
 ) -> Result<PageRun, CliError> {
     let source = input::read(path)?;
@@ -29,7 +29,7 @@ pub(super) fn run<const N: usize>(
             _ => recorded::<3>(&source),
         };
     }
-    let program = source.program(&reading.options(machine.read_options())?)?;
+    let program = source.program(options)?;
     let plan = plan_program(&source.name, &program, machine, Mode::Spanning)?;
     let refused = |error: RunError| CliError::Run { program: plan.source.clone(), source: error };
     let job = Job::new(&RunOptions::default(), &plan, machine).map_err(refused)?;

@@ -121,9 +121,9 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     let kept = kept.map(|path| files.edited("--parameters", path, "--parameters")).transpose()?;
     let machine = input::any_machine(arguments.machine.as_ref())?;
     let source = input::read(&arguments.program)?;
-    let options = arguments.reading.options(machine.read_options())?;
-    let program = source.program(&options)?;
-    let after = options.parameters.after(&program.parameters);
+    let reading = arguments.reading.options(machine.read_options())?;
+    let program = source.program(&reading)?;
+    let after = reading.parameters.after(&program.parameters);
     let options = RunOptions {
         script: arguments.at.as_ref(),
         injections: arguments.inject.as_ref(),
@@ -131,7 +131,7 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     };
     let (summary, mut written) = on_machine!(machine, machine => {
         let outputs = match &arguments.against {
-            Some(path) => outputs.against(against::run(path, &arguments.reading, machine)?),
+            Some(path) => outputs.against(against::run(path, &reading, machine)?),
             None => outputs,
         };
         let plan = plan_program(&source.name, &program, machine, Mode::Spanning)?;

@@ -15,7 +15,37 @@ use crate::simulate::live::{Due, When};
 use crate::trace::{AxisTick, TraceRow};
 
 /// Columns of the path, then seven of each axis that there is.
-const PATH_COLUMNS: [&str; 8] = ["tick", "t_s", "s_mm", "v_mm_s", "a_mm_s2", "j_mm_s3", "state", "line"];
+const PATH_COLUMNS: [(&str, PathColumn); 8] = [
+    ("tick", PathColumn::Tick),
+    ("t_s", PathColumn::Time),
+    ("s_mm", PathColumn::Position),
+    ("v_mm_s", PathColumn::Feed),
+    ("a_mm_s2", PathColumn::Acceleration),
+    ("j_mm_s3", PathColumn::Jerk),
+    ("state", PathColumn::State),
+    ("line", PathColumn::Line),
+];
+
+/// A column of the path.
+#[derive(Clone, Copy, Debug)]
+enum PathColumn {
+    Tick,
+    Time,
+    Position,
+    Feed,
+    Acceleration,
+    Jerk,
+    State,
+    Line,
+}
+
+/// A column.
+#[derive(Clone, Copy, Debug)]
+enum Column {
+    Path(PathColumn),
+    /// An axis, and which of [`AXIS_COLUMNS`].
+    Axis(usize, usize),
+}
 
 // Decimals. A position step is 2⁻³² mm = 2.3·10⁻¹⁰ mm, a step of the converter 0.3 mV.
 const TIME: usize = 9;
@@ -95,15 +125,18 @@ impl TraceArguments {
     /// # Errors
     /// There is no such column.
     pub(super) fn selection(&self, info: &RunInfo) -> Result<Selection, CliError> {
-        let names = names(info);
-        let place = |name: &String| {
-            let place = names.iter().position(|known| known == name.trim());
-            place.ok_or_else(|| CliError::Column { found: name.clone(), expected: names.join(", ") })
+        let all = all_columns(info);
+        let named = |name: &String| {
+            let found = all.iter().find(|(known, _)| known == name.trim()).cloned();
+            found.ok_or_else(|| {
+                let names: Vec<&str> = all.iter().map(|(name, _)| name.as_str()).collect();
+                CliError::Column { found: name.clone(), expected: names.join(", ") }
+            })
         };
         let columns = if self.columns.is_empty() {
-            (0..names.len()).collect()
+            all
         } else {
-            self.columns.iter().map(place).collect::<Result<_, _>>()?
+            self.columns.iter().map(named).collect::<Result<_, _>>()?
         };
         let due = |when: Option<When>| when.map(|when| when.due(info));
         let every = self.every.map_or(1, NonZeroU64::get);
@@ -115,14 +148,15 @@ impl TraceArguments {
 /// The columns of a trace, and its ticks.
 #[derive(Clone, Debug)]
 pub(super) struct Selection {
-    columns: Vec<usize>,
+    /// With their names.
+    columns: Vec<(String, Column)>,
     ticks: Ticks,
 }
 
 impl Selection {
     /// Everything.
     pub(super) fn all(info: &RunInfo) -> Self {
-        Self { columns: (0..names(info).len()).collect(), ticks: Ticks::ALL }
+        Self { columns: all_columns(info), ticks: Ticks::ALL }
     }
 }
 
@@ -152,14 +186,15 @@ impl Ticks {
     }
 }
 
-/// The names of all columns.
-fn names(info: &RunInfo) -> Vec<String> {
-    let of_axes = info.axes.iter().flat_map(|axis| {
-        AXIS_COLUMNS.map(|AxisColumn { quantity, unit, .. }| {
-            format!("{}_{quantity}_{}", axis.name, unit(axis.unit()))
+/// All columns, with their names.
+fn all_columns(info: &RunInfo) -> Vec<(String, Column)> {
+    let of_axes = info.axes.iter().enumerate().flat_map(|(place, axis)| {
+        AXIS_COLUMNS.iter().enumerate().map(move |(column, AxisColumn { quantity, unit, .. })| {
+            (format!("{}_{quantity}_{}", axis.name, unit(axis.unit())), Column::Axis(place, column))
         })
     });
-    PATH_COLUMNS.map(str::to_owned).into_iter().chain(of_axes).collect()
+    let of_path = PATH_COLUMNS.into_iter().map(|(name, column)| (name.to_owned(), Column::Path(column)));
+    of_path.chain(of_axes).collect()
 }
 
 /// A trace being written.
@@ -178,7 +213,7 @@ impl<W: Write> TraceWriter<W> {
     pub(super) fn new(out: W, info: &RunInfo, selection: Selection) -> Self {
         let csv = csv::Writer::from_writer(out);
         let mut writer = Self { csv, tick_s: info.tick_s, selection, field: Vec::new(), failure: None };
-        writer.failure = writer.header(info).err();
+        writer.failure = writer.header().err();
         writer
     }
 
@@ -197,9 +232,8 @@ impl<W: Write> TraceWriter<W> {
         }
     }
 
-    fn header(&mut self, info: &RunInfo) -> io::Result<()> {
-        let names = names(info);
-        for name in self.selection.columns.iter().filter_map(|&column| names.get(column)) {
+    fn header(&mut self) -> io::Result<()> {
+        for (name, _) in &self.selection.columns {
             self.csv.write_field(name).map_err(csv_failure)?;
         }
         self.csv.write_record(None::<&[u8]>).map_err(csv_failure)
@@ -207,25 +241,24 @@ impl<W: Write> TraceWriter<W> {
 
     fn row<const N: usize>(&mut self, tick: &TraceRow<N>) -> io::Result<()> {
         for index in 0..self.selection.columns.len() {
-            self.column(self.selection.columns[index], tick)?;
+            self.column(self.selection.columns[index].1, tick)?;
         }
         self.csv.write_record(None::<&[u8]>).map_err(csv_failure)
     }
 
-    fn column<const N: usize>(&mut self, column: usize, tick: &TraceRow<N>) -> io::Result<()> {
+    fn column<const N: usize>(&mut self, column: Column, tick: &TraceRow<N>) -> io::Result<()> {
         match column {
-            0 => self.text(format_args!("{}", tick.tick)),
-            1 => self.number(tick.tick as f64 * self.tick_s, TIME),
-            2 => self.number(tick.s_mm, POSITION),
-            3 => self.number(tick.v_mm_s, VELOCITY),
-            4 => self.number(tick.a_mm_s2, CHANGE),
-            5 => self.number(tick.j_mm_s3, CHANGE),
-            6 => self.text(format_args!("{}", tick.state)),
-            7 => self.text(format_args!("{}", tick.line)),
-            of_axis => {
-                let of_axes = of_axis - PATH_COLUMNS.len();
-                let column = &AXIS_COLUMNS[of_axes % AXIS_COLUMNS.len()];
-                self.number((column.of)(&tick.axes[of_axes / AXIS_COLUMNS.len()]), column.decimals)
+            Column::Path(PathColumn::Tick) => self.text(format_args!("{}", tick.tick)),
+            Column::Path(PathColumn::Time) => self.number(tick.tick as f64 * self.tick_s, TIME),
+            Column::Path(PathColumn::Position) => self.number(tick.s_mm, POSITION),
+            Column::Path(PathColumn::Feed) => self.number(tick.v_mm_s, VELOCITY),
+            Column::Path(PathColumn::Acceleration) => self.number(tick.a_mm_s2, CHANGE),
+            Column::Path(PathColumn::Jerk) => self.number(tick.j_mm_s3, CHANGE),
+            Column::Path(PathColumn::State) => self.text(format_args!("{}", tick.state)),
+            Column::Path(PathColumn::Line) => self.text(format_args!("{}", tick.line)),
+            Column::Axis(axis, column) => {
+                let AxisColumn { of, decimals, .. } = AXIS_COLUMNS[column];
+                self.number(of(&tick.axes[axis]), decimals)
             }
         }
     }
