@@ -1,7 +1,7 @@
 // From where the path is seen: its axes, direction, place and scale on the screen.
 
 /** The greatest distance of the drawn path from the true one, in pixels of the screen. */
-export const OFF_PX = 0.5;
+const OFF_PX = 0.5;
 /** Space around the path [px]. */
 const AIR_PX = 28;
 /** From the front, the right and above [rad]. */

@@ -121,6 +121,7 @@ pub(super) fn of_run<const N: usize>(
     let (path_columns, tolerance_mm) = path(trace, summary, bytes_max, &mut fixed);
     columns.extend(path_columns);
     let quantities = quantities(trace, summary);
+    let reasons = reasons(trace);
     let mut header = Header {
         format: FORMAT,
         program: file_name(program_name(trace)),
@@ -133,7 +134,7 @@ pub(super) fn of_run<const N: usize>(
         axes: axes(trace, summary),
         views: views_of(trace, summary),
         tolerance_mm,
-        reasons: reasons(trace).iter().map(|&reason| (reason, ink(reason, &reasons(trace)))).collect(),
+        reasons: reasons.iter().map(|&reason| (reason, ink(reason, &reasons))).collect(),
         kinds: distinct(trace.blocks.iter().map(|block| &*block.kind)),
         rests: summary
             .rests
@@ -169,27 +170,23 @@ pub(super) fn of_run<const N: usize>(
         }
         header.division.ticks_per_sample = division.ticks_per_sample;
         header.columns = with_samples;
-        let compressed = compressed(&header, &bytes)?;
-        if compressed.len() <= bytes_max || division.samples() <= 1 {
-            return Ok(compressed);
+        let data = with_header(&header, &bytes)?;
+        if data.len() <= bytes_max || division.samples() <= 1 {
+            return Ok(data);
         }
         division.ticks_per_sample *= 2;
     }
 }
 
-fn compressed(header: &Header<'_>, columns: &[u8]) -> io::Result<Vec<u8>> {
+fn with_header(header: &Header<'_>, columns: &[u8]) -> io::Result<Vec<u8>> {
     let header = serde_json::to_vec(header)?;
-    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
-    encoder.write_all(&(header.len() as u32).to_le_bytes())?;
-    encoder.write_all(&header)?;
-    encoder.write_all(columns)?;
-    encoder.finish()
+    compressed(&[&(header.len() as u32).to_le_bytes(), &header, columns])
 }
 
-/// Text, compressed.
-pub(super) fn of_text(text: &[u8]) -> io::Result<Vec<u8>> {
+/// Parts behind each other, compressed.
+pub(super) fn compressed(parts: &[&[u8]]) -> io::Result<Vec<u8>> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
-    encoder.write_all(text)?;
+    parts.iter().try_for_each(|part| encoder.write_all(part))?;
     encoder.finish()
 }
 

@@ -82,7 +82,7 @@ impl PageRun {
     pub(super) fn with_summary<const N: usize>(trace: &RunTrace<N>, summary: &Summary) -> io::Result<Self> {
         let program = trace.source.as_ref().map(|source| {
             let program = ProgramJson { text: &source.text, times: source.times.clone() };
-            data::of_text(&serde_json::to_vec(&program)?)
+            data::compressed(&[&serde_json::to_vec(&program)?])
         });
         let program = program.transpose()?;
         let page = (PAGE_PER_S * summary.executed_time_s).clamp(PAGE_LEAST, PAGE_MOST) - PAGE_EMPTY;
