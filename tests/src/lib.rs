@@ -15,6 +15,7 @@ pub mod dd;
 pub mod figures;
 pub mod fuzz;
 pub mod judge;
+pub mod link;
 pub mod random;
 pub mod samples;
 pub mod s4;

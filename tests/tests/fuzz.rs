@@ -8,16 +8,23 @@ use motion_tests::random::Random;
 /// Random inputs in a short run; `MOTION_TEST_PROGRAMS` has more.
 const INPUTS: usize = 2000;
 
+/// The inputs of a corpus, each with its bytes.
+fn seeds(corpus: &str) -> impl Iterator<Item = Vec<u8>> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus").join(corpus);
+    std::fs::read_dir(&folder).expect("a corpus").map(|entry| {
+        let path = entry.expect("an entry").path();
+        println!("{}", path.display());
+        std::fs::read(&path).expect("a seed")
+    })
+}
+
 /// With any laws: a search has kept a seed for what it did with those of its time.
 #[test]
 fn every_seed_of_the_corpus_keeps_the_promises() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/kernel");
     let mut inputs = 0;
-    for entry in std::fs::read_dir(&folder).expect("a corpus") {
-        let path = entry.expect("an entry").path();
-        let bytes = std::fs::read(&path).expect("a seed");
+    for bytes in seeds("kernel") {
         for laws in Laws::ALL {
-            println!("{}, {laws:?}", path.display());
+            println!("{laws:?}");
             drive_with(laws, &bytes);
         }
         inputs += 1;
@@ -43,12 +50,9 @@ fn random_bytes_keep_the_promises() {
 
 #[test]
 fn every_seed_of_the_link_keeps_its_promises() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/link");
     let mut inputs = 0;
-    for entry in std::fs::read_dir(&folder).expect("a corpus") {
-        let path = entry.expect("an entry").path();
-        println!("{}", path.display());
-        link::drive(&std::fs::read(&path).expect("a seed"));
+    for bytes in seeds("link") {
+        link::drive(&bytes);
         inputs += 1;
     }
     assert!(inputs >= 50, "{inputs} seeds");
@@ -67,12 +71,8 @@ fn random_bytes_keep_the_promises_of_the_link() {
 
 #[test]
 fn every_seed_of_gcode_is_read_as_promised() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/corpus/gcode");
     let (mut inputs, mut accepted) = (0, 0);
-    for entry in std::fs::read_dir(&folder).expect("a corpus") {
-        let path = entry.expect("an entry").path();
-        let seed = std::fs::read(&path).expect("a seed");
-        println!("{}", path.display());
+    for seed in seeds("gcode") {
         accepted += usize::from(gcode::read(&seed));
         // With all that it may be read with, and cut short anywhere.
         for switches in 0..32 {

@@ -6,12 +6,10 @@ use std::fmt::Write;
 use motion_host::gcode;
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Mode as PlanMode, plan_program};
-use motion_kernel::hal::BoardOutputs;
-use motion_kernel::link::{
-    BoardLink, Event, FRAME_MAX, HostLink, Identity, ItemQueue, PROTOCOL, State, Status,
-};
-use motion_kernel::program::{FORMAT, Item, Source};
+use motion_kernel::link::{BoardLink, Event, FRAME_MAX, HostLink, Identity, ItemQueue, State, Status};
+use motion_kernel::program::{Item, Source};
 use motion_kernel::units::Position;
+use motion_tests::link::{IDENTITY, STATUS};
 use motion_tests::random::Random;
 
 /// As the emulated boards have it.
@@ -74,16 +72,7 @@ fn a_thousand_blocks_a_second_pass_a_serial_line() {
     let items = items();
     let blocks = items.iter().filter(|item| matches!(item, Item::Line { .. })).count();
     assert_eq!(blocks, BLOCKS);
-    let identity = Identity {
-        protocol: PROTOCOL,
-        format: FORMAT.into(),
-        axes: 3,
-        is_fixed_point: false,
-        tick_s: 5e-4,
-        items: ROOM as u16,
-        outputs: BoardOutputs::None,
-        machine: 0,
-    };
+    let identity = Identity { items: ROOM as u16, ..IDENTITY };
     let mut host: Box<HostLink<3, 256, 65536>> = Box::new(HostLink::new(1));
     let (mut board, mut queue) = (BoardLink::new(1, identity), ItemQueue::<3, ROOM>::new());
     let (mut down, mut up) = (Line::new(0), Line::new(ANSWER_MS));
@@ -139,19 +128,16 @@ fn a_thousand_blocks_a_second_pass_a_serial_line() {
 }
 
 fn status(tick: u32, taken: u32) -> Status<3> {
+    let position = Position::from_bits(i64::from(tick) << 30);
     Status {
         tick,
         state: State::Moving,
-        set: [Position::from_bits(i64::from(tick) << 30); 3],
-        actual: [Position::from_bits(i64::from(tick) << 30); 3],
+        set: [position; 3],
+        actual: [position; 3],
         feed_mm_s: 50.0,
         line: taken,
-        aborts: 0,
         taken,
         driven: taken,
-        is_ended: false,
-        starvations: 0,
-        is_ready: true,
-        fault: None,
+        ..STATUS
     }
 }

@@ -331,9 +331,8 @@ impl<const N: usize> Connection<N> {
 mod tests {
     use std::collections::VecDeque;
 
-    use motion_kernel::hal::BoardOutputs;
-    use motion_kernel::link::{BoardLink, ItemQueue, PROTOCOL};
-    use motion_kernel::program::FORMAT;
+    use motion_kernel::link::{BoardLink, ItemQueue};
+    use motion_tests::link::IDENTITY;
 
     use super::*;
 
@@ -371,16 +370,7 @@ mod tests {
     /// The answer is waited for by time, however many bytes come before it.
     #[test]
     fn an_answer_behind_many_bytes_is_found() {
-        let identity = Identity {
-            protocol: PROTOCOL,
-            format: FORMAT.into(),
-            axes: 3,
-            is_fixed_point: false,
-            tick_s: 5e-4,
-            items: 4,
-            outputs: BoardOutputs::None,
-            machine: 1,
-        };
+        let identity = Identity { items: 4, ..IDENTITY };
         let board = BoardLink::new(1, identity);
         let wire = Talkative { board, items: ItemQueue::new(), old: 100_000, answers: VecDeque::new() };
         let mut wire = Some(Box::new(wire) as Box<dyn Wire>);

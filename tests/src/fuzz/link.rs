@@ -15,14 +15,14 @@ use std::collections::VecDeque;
 use std::task::Poll;
 
 use arbitrary::{Result, Unstructured};
-use motion_kernel::hal::BoardOutputs;
 use motion_kernel::law::Ticks;
 use motion_kernel::link::{
-    BoardLink, Controls, Event, FRAME_MAX, HostLink, Identity, ItemQueue, Mode, PROTOCOL, ParameterBuffer,
-    State, Status,
+    BoardLink, Controls, Event, FRAME_MAX, HostLink, Identity, ItemQueue, Mode, ParameterBuffer, Status,
 };
-use motion_kernel::program::{Checksum, FORMAT, Item, Source};
+use motion_kernel::program::{Checksum, Item, Source};
 use motion_kernel::units::Position;
+
+use crate::link::{IDENTITY, STATUS};
 
 const AXES: usize = 3;
 /// Items and bytes of parameters that a board has room for.
@@ -154,17 +154,7 @@ struct Bench {
 }
 
 fn board(session: u32) -> Box<BoardLink> {
-    let identity = Identity {
-        protocol: PROTOCOL,
-        format: FORMAT.into(),
-        axes: AXES as u16,
-        is_fixed_point: false,
-        tick_s: 5e-4,
-        items: ITEMS as u16,
-        outputs: BoardOutputs::None,
-        machine: 0,
-    };
-    Box::new(BoardLink::new(session, identity))
+    Box::new(BoardLink::new(session, Identity { items: ITEMS as u16, ..IDENTITY }))
 }
 
 impl Bench {
@@ -282,20 +272,13 @@ impl Bench {
 
     fn answer(&mut self) {
         let mut out = [0; FRAME_MAX];
+        let came = self.items.came();
         let status = Status {
             tick: self.now_ms,
-            state: State::Idle,
-            set: [Position::ZERO; AXES],
-            actual: [Position::ZERO; AXES],
-            feed_mm_s: 0.0,
-            line: 0,
-            aborts: self.items.came().aborts,
-            taken: self.items.taken(),
-            driven: 0,
-            is_ended: self.items.came().is_ended,
-            starvations: 0,
-            is_ready: true,
-            fault: None,
+            aborts: came.aborts,
+            taken: came.taken,
+            is_ended: came.is_ended,
+            ..STATUS
         };
         let mut length = self.board.transmit_parameters(&[7; PARAMETERS], &self.parameters, &mut out);
         if length == 0 {
@@ -317,7 +300,7 @@ impl Bench {
                 Event::Ready { next } => {
                     // Of this PC, or of one before.
                     if let Some(program) = self.program() {
-                        for number in self.pushed.min(next)..next.min(self.pushed.saturating_add(10_000)) {
+                        for number in self.pushed..next.min(self.pushed.saturating_add(10_000)) {
                             self.host.skip(&item(program, number));
                         }
                     }
