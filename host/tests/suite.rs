@@ -19,6 +19,7 @@ mod gcode;
 mod limit_share;
 mod mutation;
 mod nurbs;
+mod operated;
 mod probing;
 mod outputs;
 mod resume;
