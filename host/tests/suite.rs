@@ -20,6 +20,7 @@ mod limit_share;
 mod mutation;
 mod nurbs;
 mod operated;
+mod panel;
 mod probing;
 mod outputs;
 mod resume;

@@ -26,6 +26,9 @@ pub trait Board: Send {
     /// Goes on: listens for at most `wait`, and sends what there is to send. Tells what has happened since.
     fn step(&mut self, wait: Duration) -> Vec<BoardEvent>;
 
+    /// Whether the board has confirmed everything that was commanded. Before, a command may be lost with the wire.
+    fn is_settled(&self) -> bool;
+
     /// Reads and plans a program, beside everything else; [`BoardEvent::Loaded`] or [`BoardEvent::NotLoaded`] tells what came of
     /// it. It takes the place of the one before.
     ///

@@ -334,6 +334,10 @@ impl<R: Root + Send, const N: usize, const M: usize> Board for Operated<R, N, M>
         events
     }
 
+    fn is_settled(&self) -> bool {
+        self.connection.is_settled()
+    }
+
     fn load(&mut self, source: Source) -> Result<(), BoardError> {
         if matches!(self.work, Some(Work::Program(_))) {
             return Err(BoardError::UnderWay);

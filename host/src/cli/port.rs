@@ -8,7 +8,7 @@ use crate::board::port::unique;
 use crate::board::sender::{Found, Permissions};
 use crate::board::simulator::{self, SimulatedBoard};
 use crate::board::wire::Wire;
-use crate::board::{BoardError, Connection, Port};
+use crate::board::{Board, BoardError, Connection, Port, operated};
 use crate::machine::Machine;
 use crate::planning::on_axis_count;
 
@@ -60,6 +60,15 @@ impl OptionalPort {
     /// The port, if one is asked for.
     pub(super) fn given(&self) -> Option<PortArguments> {
         Some(PortArguments { port: self.port.clone()?, baud: self.baud })
+    }
+}
+
+impl OptionalPort {
+    /// The board there, or the simulated one.
+    pub(super) fn operated<const N: usize>(&self, machine: &Machine<N>) -> Result<Box<dyn Board>, CliError> {
+        let port = self.port.clone().unwrap_or(Port::Simulator);
+        operated::open(machine, &port, self.baud)
+            .map_err(|source| CliError::Board { port: port.to_string(), source })
     }
 }
 

@@ -49,6 +49,12 @@ pub fn write_html<const N: usize>(
     page::write(trace, &summary, &headline(trace, &summary), against, out)
 }
 
+/// The page of an operator's panel, which has its data from its server.
+#[must_use]
+pub fn panel_page() -> String {
+    page::panel()
+}
+
 /// What the run came to, in words and tables.
 fn headline<const N: usize>(trace: &RunTrace<N>, summary: &Summary) -> String {
     let outcome = outcome(trace, summary);
