@@ -25,9 +25,16 @@
 //!   report     RunTrace ─► HTML                  one file, its data inside
 //!   cli        the `motion` command
 //! ```
+//!
+//! Without the feature `terminal` it is what a page runs: no files, no threads, no wires, no command.
 
+// What only the command uses is in modules that others use, too.
+#![cfg_attr(not(feature = "terminal"), allow(dead_code, unused_imports))]
+
+#[cfg(feature = "terminal")]
 pub mod files;
 pub mod machine;
+#[cfg(feature = "terminal")]
 pub mod cli;
 pub mod touch;
 pub mod gcode;
@@ -40,6 +47,7 @@ pub mod compare;
 pub mod simulate;
 pub mod recording;
 pub mod flight;
+#[cfg(feature = "terminal")]
 pub mod board;
 pub mod axis_unit;
 pub mod trace;

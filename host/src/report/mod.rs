@@ -8,12 +8,16 @@
 //!
 //! Reports of experiments ([`drive`], [`smoothness`]) are pictures between words.
 
+#[cfg(feature = "terminal")]
 mod decimate;
+#[cfg(feature = "terminal")]
 pub mod drive;
 mod format;
 pub mod page;
 mod palette;
+#[cfg(feature = "terminal")]
 mod plots;
+#[cfg(feature = "terminal")]
 pub mod smoothness;
 mod summary;
 mod tables;
