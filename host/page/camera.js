@@ -53,6 +53,18 @@ export class Camera {
     this.scale = this.limited(Number.isFinite(scale) ? scale : Math.min(width, height));
   }
 
+  /** From where it was moved to see the path. */
+  pose() {
+    const { yaw, pitch, pivot, offset, scale } = this;
+    return { yaw, pitch, pivot, offset, scale };
+  }
+
+  /** Sees it from there. */
+  take(pose) {
+    Object.assign(this, pose, { isMoved: true });
+    this.scale = this.limited(pose.scale);
+  }
+
   /** Pixels to a millimetre: no more than the data resolve. */
   limited(scale) {
     return Math.min(scale, OFF_PX / (this.runs[0].outline.toleranceMm * this.ratio));

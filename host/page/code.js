@@ -31,7 +31,9 @@ export class Code {
       event.preventDefault();
     });
     state.on("cursor", () => this.follow());
-    new ResizeObserver(() => this.draw()).observe(this.list);
+    const resized = new ResizeObserver(() => this.draw());
+    resized.observe(this.list);
+    state.on("end", () => resized.disconnect());
     this.follow();
   }
 

@@ -3,10 +3,15 @@
 const FORMAT = 1;
 
 /** Bytes of a text in base64, inflated. */
-export async function inflate(text) {
+export function inflate(text) {
   const letters = atob(text);
   const bytes = new Uint8Array(letters.length);
   for (let i = 0; i < bytes.length; i += 1) bytes[i] = letters.charCodeAt(i);
+  return inflateBytes(bytes);
+}
+
+/** Bytes, inflated. */
+export async function inflateBytes(bytes) {
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }

@@ -22,7 +22,8 @@ const NEAR_PX = 14;
 const FACTORS = [0, 10, 30, 100, 300, 1000, 3000, 10000];
 
 export class PathView {
-  constructor(state) {
+  /** `kept` is what the reader chose of the path that was shown before, if there was one. */
+  constructor(state, kept) {
     this.state = state;
     this.figure = document.getElementById("path");
     const { views } = state.run.header;
@@ -35,26 +36,40 @@ export class PathView {
     this.dot = this.stage.appendChild(document.createElement("i"));
     this.dot.className = "dot";
     this.colours = coloursOf(state.run);
-    this.colour = this.colours[0];
-    this.factor = 0;
-    this.view = views[0];
+    this.colour = this.colours.find(({ name }) => name === kept?.colour) ?? this.colours[0];
+    this.factor = kept?.factor ?? 0;
+    this.view = views.find(([name]) => name === kept?.view) ?? views[0];
     this.camera = new Camera(state.runs);
     this.makeTools(views);
     this.fit();
+    if (kept?.pose && kept.view === this.view[0]) this.camera.take(kept.pose);
     listen(this);
     this.redraw = () => this.draw();
     state.on("cursor", () => nextFrame(() => this.place()));
-    new ResizeObserver(() => {
+    const resized = new ResizeObserver(() => {
       if (!this.camera.isMoved) this.fit();
       nextFrame(this.redraw);
-    }).observe(this.stage);
-    onChange(() => this.draw());
+    });
+    resized.observe(this.stage);
+    const forget = onChange(() => this.draw());
+    state.on("end", () => {
+      resized.disconnect();
+      forget();
+      clearTimeout(this.later);
+    });
     nextFrame(this.redraw);
+  }
+
+  /** What the reader chose. */
+  kept() {
+    if (!this.camera) return null;
+    const pose = this.camera.isMoved ? this.camera.pose() : null;
+    return { colour: this.colour.name, factor: this.factor, view: this.view[0], pose };
   }
 
   makeTools(views) {
     const tools = this.figure.querySelector(".tools");
-    const group = (name, items, choose) => {
+    const group = (name, items, chosen, choose) => {
       const box = tools.appendChild(document.createElement("div"));
       box.className = "choice";
       box.setAttribute("role", "group");
@@ -63,7 +78,7 @@ export class PathView {
         const button = box.appendChild(document.createElement("button"));
         button.type = "button";
         button.textContent = item;
-        button.setAttribute("aria-pressed", String(i === 0));
+        button.setAttribute("aria-pressed", String(i === chosen));
         button.addEventListener("click", () => {
           for (const other of buttons) other.setAttribute("aria-pressed", String(other === button));
           choose(i);
@@ -72,14 +87,14 @@ export class PathView {
       });
     };
     if (views.length > 1) {
-      group("View", views.map(([name]) => name), (i) => {
+      group("View", views.map(([name]) => name), views.indexOf(this.view), (i) => {
         this.view = views[i];
         this.camera.lookFromAbove();
         this.fit();
         nextFrame(this.redraw);
       });
     }
-    group("Colour", this.colours.map((colour) => colour.name), (i) => {
+    group("Colour", this.colours.map((colour) => colour.name), this.colours.indexOf(this.colour), (i) => {
       this.colour = this.colours[i];
       nextFrame(this.redraw);
     });
@@ -87,6 +102,7 @@ export class PathView {
     label.append("Actual path ");
     const select = label.appendChild(document.createElement("select"));
     for (const factor of FACTORS) select.append(new Option(factor ? `error × ${factor}` : "not shown", factor));
+    select.value = this.factor;
     select.addEventListener("change", () => {
       this.factor = Number(select.value);
       nextFrame(this.redraw);

@@ -72,14 +72,20 @@ export class Plots {
       this.age();
       this.overview.isOld = true;
     };
-    new ResizeObserver(() => {
+    const resized = new ResizeObserver(() => {
       all();
       nextFrame(this.redraw);
-    }).observe(this.element);
-    onChange(() => {
+    });
+    resized.observe(this.element);
+    const forget = onChange(() => {
       all();
       // On paper all of them are seen.
       this.draw(true);
+    });
+    state.on("end", () => {
+      seen.disconnect();
+      resized.disconnect();
+      forget();
     });
     this.element.addEventListener("keydown", (event) => this.key(event));
     this.age();

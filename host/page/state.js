@@ -20,7 +20,7 @@ export class State {
     this.cursor = 0;
     /** Where the cursor was set; it comes back when a pointer that it followed leaves. */
     this.placed = 0;
-    this.listeners = { cursor: [], window: [] };
+    this.listeners = { cursor: [], window: [], end: [] };
     this.showAll();
   }
 
@@ -30,6 +30,24 @@ export class State {
 
   tell(change) {
     for (const listener of this.listeners[change]) listener();
+  }
+
+  /** Other runs are shown: nothing is to be drawn of these any more. */
+  end() {
+    this.tell("end");
+    this.listeners = { cursor: [], window: [], end: [] };
+  }
+
+  /** What the reader chose of cursor and window. */
+  kept() {
+    return { over: this.over, window: this.isWhole() ? null : [this.from, this.to], placed: this.placed };
+  }
+
+  /** Chooses it again. */
+  restore({ over, window, placed }) {
+    this.layOver(over);
+    if (window) this.show(...window);
+    this.place(placed);
   }
 
   /** The tick of a run at x. */

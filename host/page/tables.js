@@ -30,12 +30,19 @@ function table(name, headings, rows) {
 const cell = (text, isWord) => make("td", isWord ? { class: "word" } : {}, text);
 
 export class Tables {
-  constructor(state, code) {
+  /** `kept` is what the reader chose of the tables that were shown before, if there were any. */
+  constructor(state, code, kept) {
     this.state = state;
     this.code = code;
+    this.chosen = kept ?? "contour error";
     const parent = document.getElementById("tables");
     const sections = [this.runs(), this.times(), this.worst(), this.blocks()].filter(Boolean);
-    parent.append(...sections);
+    parent.replaceChildren(...sections);
+  }
+
+  /** What the reader chose: the quantity whose worst places are shown. */
+  kept() {
+    return this.chosen;
   }
 
   /** Two runs beside each other. */
@@ -80,6 +87,7 @@ export class Tables {
     const choice = make("div", { class: "choice", role: "group", "aria-label": "Quantity" });
     const place = make("div");
     const show = ({ name, unit, places }, button) => {
+      this.chosen = name;
       for (const other of choice.children) other.setAttribute("aria-pressed", String(other === button));
       const rows = places.map(({ tick, line, s_mm, value }) => {
         const time = tick * state.run.tickS;
@@ -98,7 +106,7 @@ export class Tables {
       button.addEventListener("click", () => show(quantity, button));
       choice.append(button);
     }
-    const first = Math.max(0, worst.findIndex((quantity) => quantity.name === "contour error"));
+    const first = Math.max(0, worst.findIndex((quantity) => quantity.name === this.chosen));
     show(worst[first], choice.children[first]);
     return make("section", { id: "worst" }, make("h2", {}, "Worst places"),
       make("p", {}, "Where the quantity is greatest, each visit to a line once. A value goes there."), choice, place);

@@ -1,7 +1,7 @@
 // The style sheet's colours, for what is drawn. They change with the paper: light, dark, printed.
 
 const known = new Map();
-const listeners = [];
+const listeners = new Set();
 
 /** A variable of the style sheet. */
 function variable(name) {
@@ -33,9 +33,10 @@ export function shade(part) {
   return `rgb(${mixed.join(",")})`;
 }
 
-/** Calls `listener` when colours have changed. */
+/** Calls `listener` when colours have changed, until what it returns is called. */
 export function onChange(listener) {
-  listeners.push(listener);
+  listeners.add(listener);
+  return () => listeners.delete(listener);
 }
 
 function changed() {

@@ -23,6 +23,8 @@
 //!   identify   recordings ─► drive parameters     what an axis is, from its runs
 //!   tuning     drive parameters ─► gains          with the reason for each
 //!   report     RunTrace ─► HTML                  one file, its data inside
+//!   ramp       limits, feeds ─► figures         one change of feed
+//!   playground request ─► steps ─► answer       what a page in a browser asks for
 //!   cli        the `motion` command
 //! ```
 //!
@@ -55,4 +57,6 @@ pub mod drive;
 pub mod identify;
 pub mod tuning;
 pub mod report;
+pub mod ramp;
+pub mod playground;
 pub mod sine;

@@ -13,7 +13,7 @@ pub mod needs;
 pub mod time;
 
 pub use needs::Needs;
-pub use time::{Reason, Times};
+pub use time::{Reason, Times, traced};
 
 use crate::gcode::Program;
 use crate::machine::Machine;

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use motion_kernel::plan;
 
 use crate::planning::{Item, PlacedRamp, Plan, Stretch};
+use crate::trace::TracedProgram;
 
 /// What holds the feed down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -203,6 +204,17 @@ impl Times {
 
 /// A feed that is this part below a ceiling is at it: plans keep off by less.
 const CEILING_SHARE: f64 = 1e-6;
+
+/// A program for the report of its run: its text, and where the time of its plan goes.
+#[must_use]
+pub fn traced<const N: usize>(text: &[u8], plan: &Plan<N>) -> TracedProgram {
+    let times = Times::of(plan);
+    let of_reason = |reason: Reason| (reason.words(), times.of_reason_s(reason));
+    TracedProgram {
+        text: String::from_utf8_lossy(text).into_owned(),
+        times: Reason::ALL.map(of_reason).into_iter().filter(|(_, time_s)| *time_s > 0.0).collect(),
+    }
+}
 
 #[cfg(test)]
 mod tests {

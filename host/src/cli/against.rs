@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::error::CliError;
 use super::input::{self, Source};
-use super::outputs::{trace_of, traced};
+use crate::check;
 use crate::gcode::{AXES_MAX, ReadOptions};
 use crate::machine::Machine;
 use crate::planning::{Mode, plan_program};
@@ -33,7 +33,7 @@ pub(super) fn run<const N: usize>(
     let plan = plan_program(&source.name, &program, machine, Mode::Spanning)?;
     let refused = |error: RunError| CliError::Run { program: plan.source.clone(), source: error };
     let job = Job::new(&RunOptions::default(), &plan, machine).map_err(refused)?;
-    page(&job, Some(traced(&source.text, &plan)), |observe| {
+    page(&job, Some(check::traced(&source.text, &plan)), |observe| {
         simulate::on_simulated(machine, None, |hardware| simulate::run_on(&job, hardware, observe))
     })
 }
@@ -53,6 +53,6 @@ fn page<const N: usize>(
     let mut ticks = Vec::new();
     let summary = run(&mut |tick| ticks.push(*tick))
         .map_err(|source| CliError::Run { program: job.info.program.clone(), source })?;
-    let trace = RunTrace { source: program, ..trace_of(job, &summary, ticks) };
+    let trace = RunTrace { source: program, ..job.trace(&summary, ticks) };
     PageRun::of(&trace).map_err(CliError::Output)
 }

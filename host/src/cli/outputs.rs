@@ -7,7 +7,7 @@ use super::error::{CliError, Outcome};
 use super::progress::Progress;
 use super::trace::{TraceArguments, TraceWriter};
 use super::until_closed::UntilClosed;
-use crate::check::{Reason, Times};
+use crate::check;
 use crate::files::{Failure, Files, FilesError, OutputFile};
 use crate::planning::Plan;
 use crate::report::{self, PageRun};
@@ -157,7 +157,7 @@ impl Outputs {
 
     /// With the program's text, and where the time of its plan goes.
     pub(super) fn of_program<const N: usize>(mut self, text: &[u8], plan: &Plan<N>) -> Self {
-        self.program = Some(traced(text, plan));
+        self.program = Some(check::traced(text, plan));
         self
     }
 
@@ -185,7 +185,7 @@ impl Outputs {
             ran
         })?;
         let ran = ran.map_err(|source| CliError::Run { program: job.info.program.clone(), source })?;
-        let written = ticks.write(|ticks| RunTrace { source, ..trace_of(job, summary_of(&ran), ticks) });
+        let written = ticks.write(|ticks| RunTrace { source, ..job.trace(summary_of(&ran), ticks) });
         Ok((ran, written))
     }
 
@@ -259,36 +259,4 @@ impl<const N: usize> Ticks<N> {
             .write("report", self.report, |file| report::write_html(&trace(ticks), against.as_ref(), file));
         written
     }
-}
-
-/// A program for the report of its run.
-pub(super) fn traced<const N: usize>(text: &[u8], plan: &Plan<N>) -> TracedProgram {
-    let times = Times::of(plan);
-    let of_reason = |reason: Reason| (reason.words(), times.of_reason_s(reason));
-    TracedProgram {
-        text: String::from_utf8_lossy(text).into_owned(),
-        times: Reason::ALL.map(of_reason).into_iter().filter(|(_, time_s)| *time_s > 0.0).collect(),
-    }
-}
-
-/// What a run leaves behind.
-pub(super) fn trace_of<const N: usize>(
-    job: &Job<N>,
-    summary: &RunSummary,
-    ticks: Vec<TraceRow<N>>,
-) -> RunTrace<N> {
-    let mut trace = RunTrace {
-        ticks,
-        end: summary.end,
-        commands: summary.commands.clone(),
-        outputs: summary.outputs.clone(),
-        faults: summary.faults.clone(),
-        notices: summary.notices.clone(),
-        ..job.info.empty_trace()
-    };
-    for ((axis, figures), ended) in trace.axes.iter_mut().zip(&job.header.axes).zip(&summary.axes) {
-        axis.following_error_limit_um = figures.following_error_limit_mm * 1e3;
-        axis.end_error_counts = ended.end_error_counts;
-    }
-    trace
 }

@@ -11,12 +11,13 @@ use serde::{Deserialize, Serialize};
 use super::error::RunError;
 use super::inject::Injections;
 use super::live::Script;
+use super::summary::RunSummary;
 use crate::axis_unit::AxisUnit;
 use crate::gcode::Axis;
 use crate::machine::{AxisError, AxisSettings, Machine};
 use crate::planning::{Executable, Item as PlanItem, Plan, PlannedProbe};
 use crate::touch::Surface;
-use crate::trace::{PathLimits, RunTrace, TracedAxis, TracedBlock};
+use crate::trace::{PathLimits, RunTrace, TraceRow, TracedAxis, TracedBlock};
 
 /// The number type of the kernel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -251,6 +252,25 @@ impl<const N: usize> Job<N> {
             script: options.script.cloned(),
             info: RunInfo::new(plan, machine),
         })
+    }
+
+    /// What a run of it leaves behind: its ticks, and what they came to.
+    #[must_use]
+    pub fn trace(&self, summary: &RunSummary, ticks: Vec<TraceRow<N>>) -> RunTrace<N> {
+        let mut trace = RunTrace {
+            ticks,
+            end: summary.end,
+            commands: summary.commands.clone(),
+            outputs: summary.outputs.clone(),
+            faults: summary.faults.clone(),
+            notices: summary.notices.clone(),
+            ..self.info.empty_trace()
+        };
+        for ((axis, figures), ended) in trace.axes.iter_mut().zip(&self.header.axes).zip(&summary.axes) {
+            axis.following_error_limit_um = figures.following_error_limit_mm * 1e3;
+            axis.end_error_counts = ended.end_error_counts;
+        }
+        trace
     }
 
     /// The kernel's axes.

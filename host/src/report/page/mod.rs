@@ -1,15 +1,21 @@
 //! The page of a run: `host/page`, with a run's data in it, as one file.
 //!
 //! The page's modules import each other by names that an import map gives to their text, so the file works without a server.
-//! What it says about the run in words and tables is made here, and is there without a script, too.
+//! What it says about the run in words and tables is made here, and is there without a script, too. The playground is the same
+//! page with an editor, sliders and a module instead of data.
 
 mod column;
 mod data;
 mod outline;
+#[cfg(feature = "terminal")]
+mod playground;
 mod samples;
 mod worst;
 
 use std::io::{self, Write};
+
+#[cfg(feature = "terminal")]
+pub use self::playground::{Playground, Sheet};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
@@ -24,12 +30,14 @@ use crate::trace::RunTrace;
 const INDEX: &str = include_str!("../../../page/index.html");
 const STYLE: &str = include_str!("../../../page/style.css");
 
-/// The page's modules, by the names they import each other by. The last one starts the page.
-const MODULES: [(&str, &str); 20] = [
+/// A module of a page: the name that others import it by, and its text.
+type Module = (&'static str, &'static str);
+
+/// What all pages have.
+const MODULES: [Module; 19] = [
     ("page/work.js", include_str!("../../../page/work.js")),
     ("page/format.js", include_str!("../../../page/format.js")),
     ("page/data.js", include_str!("../../../page/data.js")),
-    ("page/source.js", include_str!("../../../page/source.js")),
     ("page/pyramid.js", include_str!("../../../page/pyramid.js")),
     ("page/run.js", include_str!("../../../page/run.js")),
     ("page/state.js", include_str!("../../../page/state.js")),
@@ -45,6 +53,12 @@ const MODULES: [(&str, &str); 20] = [
     ("page/path.js", include_str!("../../../page/path.js")),
     ("page/code.js", include_str!("../../../page/code.js")),
     ("page/tables.js", include_str!("../../../page/tables.js")),
+    ("page/workbench.js", include_str!("../../../page/workbench.js")),
+];
+
+/// What a report has, the last one to start it.
+const REPORT: [Module; 2] = [
+    ("page/source.js", include_str!("../../../page/source.js")),
     ("page/main.js", include_str!("../../../page/main.js")),
 ];
 
@@ -79,6 +93,12 @@ impl PageRun {
         Self::with_summary(trace, &Summary::of(trace))
     }
 
+    /// The bytes that a page's script inflates and reads.
+    #[must_use]
+    pub fn data(&self) -> &[u8] {
+        &self.data
+    }
+
     pub(super) fn with_summary<const N: usize>(trace: &RunTrace<N>, summary: &Summary) -> io::Result<Self> {
         let program = trace.source.as_ref().map(|source| {
             let program = ProgramJson { text: &source.text, times: source.times.clone() };
@@ -103,36 +123,61 @@ pub(super) fn write<const N: usize>(
     out: &mut impl Write,
 ) -> io::Result<()> {
     let run = PageRun::with_summary(trace, summary)?;
-    let runs = [("", Some(&run)), ("against-", against)];
-    let mut rest = INDEX;
-    // The template names what stands in its place.
-    while let Some((before, after)) = rest.split_once("{{") {
-        let (name, after) = after.split_once("}}").unwrap_or((after, ""));
-        out.write_all(before.as_bytes())?;
-        match name {
-            "title" => write!(out, "{}", escape(file_name(program_name(trace))))?,
-            "style" => write!(out, "{STYLE}{}", palette::variables())?,
-            "modules" => out.write_all(import_map().as_bytes())?,
-            "headline" => out.write_all(headline.as_bytes())?,
-            _ => {
-                for (role, run) in runs {
-                    let Some(run) = run else { continue };
-                    embed(&format!("{role}run"), &run.data, out)?;
-                    if let Some(program) = &run.program {
-                        embed(&format!("{role}program"), program, out)?;
-                    }
-                }
+    let title = format!("{} – motion report", file_name(program_name(trace)));
+    let page = Page { title: &title, modules: &REPORT, style: "", tools: "", headline };
+    page.write(out, |out| {
+        for (role, run) in [("", Some(&run)), ("against-", against)] {
+            let Some(run) = run else { continue };
+            embed(&format!("{role}run"), &run.data, out)?;
+            if let Some(program) = &run.program {
+                embed(&format!("{role}program"), program, out)?;
             }
         }
-        rest = after;
+        Ok(())
+    })
+}
+
+/// What differs from page to page.
+struct Page<'a> {
+    title: &'a str,
+    /// Besides [`MODULES`]; the last one starts the page.
+    modules: &'a [Module],
+    /// Behind the style of all pages.
+    style: &'a str,
+    /// HTML above the headline.
+    tools: &'a str,
+    /// HTML.
+    headline: &'a str,
+}
+
+impl Page<'_> {
+    /// Writes the page, with what `data` embeds.
+    fn write<W: Write>(&self, out: &mut W, data: impl Fn(&mut W) -> io::Result<()>) -> io::Result<()> {
+        let mut rest = INDEX;
+        // The template names what stands in its place.
+        while let Some((before, after)) = rest.split_once("{{") {
+            let (name, after) = after.split_once("}}").unwrap_or((after, ""));
+            out.write_all(before.as_bytes())?;
+            match name {
+                "title" => out.write_all(escape(self.title).as_bytes())?,
+                "style" => write!(out, "{STYLE}{}{}", self.style, palette::variables())?,
+                "modules" => out.write_all(import_map(self.modules).as_bytes())?,
+                "tools" => out.write_all(self.tools.as_bytes())?,
+                "headline" => out.write_all(self.headline.as_bytes())?,
+                "start" => out.write_all(self.modules.last().map_or("", |(name, _)| name).as_bytes())?,
+                _ => data(out)?,
+            }
+            rest = after;
+        }
+        out.write_all(rest.as_bytes())
     }
-    out.write_all(rest.as_bytes())
 }
 
 /// Every module under its name, as an address that holds its text.
-fn import_map() -> String {
+fn import_map(modules: &[Module]) -> String {
     let imports: serde_json::Map<String, serde_json::Value> = MODULES
         .iter()
+        .chain(modules)
         .map(|(name, text)| {
             let address = format!("data:text/javascript;base64,{}", BASE64.encode(text));
             ((*name).to_owned(), address.into())
@@ -147,7 +192,7 @@ fn embed(name: &str, bytes: &[u8], out: &mut impl Write) -> io::Result<()> {
 
 /// Pages, read as their script does.
 #[cfg(test)]
-pub(super) mod reading {
+pub(crate) mod reading {
     use std::io::Read as _;
 
     use flate2::read::ZlibDecoder;
@@ -155,32 +200,43 @@ pub(super) mod reading {
 
     use super::*;
 
-    pub(in crate::report) struct Read {
-        pub(in crate::report) header: Value,
+    pub(crate) struct Read {
+        pub(crate) header: Value,
         bytes: Vec<u8>,
+    }
+
+    fn inflated(bytes: &[u8]) -> Vec<u8> {
+        let mut inflated = Vec::new();
+        ZlibDecoder::new(bytes).read_to_end(&mut inflated).expect("a stream");
+        inflated
     }
 
     impl Read {
         /// An embedded text, inflated.
-        pub(in crate::report) fn text(page: &str, name: &str) -> Vec<u8> {
+        pub(crate) fn text(page: &str, name: &str) -> Vec<u8> {
             let start = format!("id=\"{name}\">");
             let text =
                 page.split_once(&start).and_then(|(_, rest)| rest.split_once("</script>")).expect("data").0;
-            let mut inflated = Vec::new();
-            let bytes = BASE64.decode(text).expect("base64");
-            ZlibDecoder::new(&bytes[..]).read_to_end(&mut inflated).expect("a stream");
-            inflated
+            inflated(&BASE64.decode(text).expect("base64"))
         }
 
-        pub(in crate::report) fn of(page: &str, name: &str) -> Self {
-            let bytes = Self::text(page, name);
+        pub(crate) fn of(page: &str, name: &str) -> Self {
+            Self::of_bytes(&Self::text(page, name))
+        }
+
+        /// What is not embedded.
+        pub(crate) fn of_data(data: &[u8]) -> Self {
+            Self::of_bytes(&inflated(data))
+        }
+
+        fn of_bytes(bytes: &[u8]) -> Self {
             let (length, rest) = bytes.split_first_chunk().expect("a length");
             let (header, bytes) = rest.split_at(u32::from_le_bytes(*length) as usize);
             Self { header: serde_json::from_slice(header).expect("JSON"), bytes: bytes.to_vec() }
         }
 
         /// A column's values, and its step. What has no value is not a number.
-        pub(in crate::report) fn column(&self, name: &str) -> (Vec<f64>, f64) {
+        pub(crate) fn column(&self, name: &str) -> (Vec<f64>, f64) {
             let columns = self.header["columns"].as_array().expect("a list");
             let column = columns.iter().find(|column| column["name"] == name).expect("a column");
             let step = column["step"].as_f64().expect("a number");
