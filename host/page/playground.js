@@ -159,7 +159,8 @@ class Playground {
       element("outcome").replaceChildren(...headline.querySelectorAll("header"));
     } else {
       element("outcome").replaceChildren();
-      headline.replaceChildren(rampFigures(header.figures));
+      headline.replaceChildren();
+      element("ramp-figures").replaceChildren(rampFigures(header.figures));
     }
     this.page = show(runs);
     this.digest = header.digest;

@@ -98,7 +98,7 @@ impl Browser {
     }
 
     /// The first thing other than null that a script returns. The driver's time limit ends the waiting.
-    fn wait_for(&self, script: &str) -> Value {
+    pub(crate) fn wait_for(&self, script: &str) -> Value {
         let script = format!(
             "const done = arguments[0]; const look = () => {{ const found = (() => {{ {script} }})(); \
              if (found === null) setTimeout(look, 20); else done(found); }}; look()"
