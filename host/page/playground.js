@@ -6,6 +6,7 @@ import { Data, inflate, inflateBytes } from "page/data.js";
 import { Engine } from "page/engine.js";
 import { figure } from "page/format.js";
 import { Sliders } from "page/sliders.js";
+import { cell, make, table } from "page/tables.js";
 import { complain, show } from "page/workbench.js";
 
 /** Time without a key until what was typed is run [ms]. */
@@ -24,14 +25,16 @@ class Playground {
     texts.program.value = program.text;
     texts.machine.value = machine.text;
     this.sheet = "program";
-    /** Edits of the machine that no answer has yet. */
+    /** The machine as it was before edits that are still under way, and these. */
+    this.base = machine.text;
     this.edits = [];
     /** Answers shown, for tests. */
     this.shown = 0;
     this.engine = new Engine(module, (stage, part) => this.tell(stage, part));
     this.sliders = new Sliders(element("sliders"), (edits) => {
       this.edits = [...this.edits, ...edits];
-      this.ask();
+      // Tuning takes its time, and is asked for.
+      if (this.sheet !== "drive" || element("drive").elements.experiment.value !== "tune") this.ask();
     });
     this.listen();
   }
@@ -42,12 +45,17 @@ class Playground {
     }
     for (const text of Object.values(texts)) {
       text.addEventListener("input", () => {
+        this.base = texts.machine.value;
         clearTimeout(this.typed);
         this.typed = setTimeout(() => this.ask(), TYPED_MS);
       });
     }
     element("ramp").addEventListener("input", () => this.ask());
     element("ramp").addEventListener("submit", (event) => event.preventDefault());
+    element("drive").addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.ask();
+    });
     element("cancel").addEventListener("click", () => {
       this.engine.cancel();
       this.say("Cancelled. What is shown is the result before.", "unfinished");
@@ -79,16 +87,17 @@ class Playground {
   }
 
   turnTo(sheet) {
-    const isOfRun = sheet !== "ramp";
-    const wasOfRun = this.sheet !== "ramp";
+    const isText = (of) => of in texts;
+    const isNew = !(isText(sheet) && isText(this.sheet)) && sheet !== this.sheet;
     this.sheet = sheet;
     for (const of of bench.querySelectorAll("[data-sheet]")) {
       if (of.matches("button")) of.setAttribute("aria-pressed", String(of.dataset.sheet === sheet));
       else of.hidden = of.dataset.sheet !== sheet;
     }
-    element("save").hidden = !isOfRun;
-    element("sliders").hidden = !isOfRun;
-    if (isOfRun !== wasOfRun) this.ask();
+    element("save").hidden = !isText(sheet);
+    element("sliders").hidden = sheet === "ramp";
+    // An experiment is made when it is asked for.
+    if (isNew && sheet !== "drive") this.ask();
   }
 
   async open(file) {
@@ -100,7 +109,10 @@ class Playground {
     const of = name.toLowerCase().endsWith(".toml") ? "machine" : "program";
     this.names[of] = name;
     texts[of].value = text;
-    if (of === "machine") this.edits = [];
+    if (of === "machine") {
+      this.base = text;
+      this.edits = [];
+    }
     this.turnTo(of);
     this.ask();
   }
@@ -119,14 +131,12 @@ class Playground {
       const numbers = Object.entries(fields).map(([name, text]) => [name, name === "law" ? text : Number(text)]);
       return { do: "ramp", ...Object.fromEntries(numbers) };
     }
-    return {
-      do: "run",
-      name: this.names.program,
-      program: texts.program.value,
-      machine_name: this.names.machine,
-      machine: texts.machine.value,
-      edits: this.edits,
-    };
+    const machine = { machine_name: this.names.machine, machine: this.base, edits: this.edits };
+    if (this.sheet === "drive") {
+      const { experiment, axis } = Object.fromEntries(new FormData(element("drive")));
+      return { do: "drive", experiment, axis: Number(axis), ...machine };
+    }
+    return { do: "run", name: this.names.program, program: texts.program.value, ...machine };
   }
 
   /** Asks for what the sheets say, and shows the answer. */
@@ -150,9 +160,14 @@ class Playground {
       this.shown += 1;
       return;
     }
-    const runs = [{ data: new Data(await inflateBytes(data)), program: null }];
-    if (request.do === "run") {
-      this.takeMachine(request, header);
+    const runs = [];
+    if (request.do !== "drive") runs.push({ data: new Data(await inflateBytes(data)), program: null });
+    if (request.do !== "ramp") this.takeMachine(request, header);
+    if (request.do === "drive") {
+      const { outcome, is_good: isGood } = header;
+      element("outcome").replaceChildren(make("p", { class: `result ${isGood ? "done" : "faulted"}` }, outcome));
+      headline.replaceChildren(...this.experiment(header));
+    } else if (request.do === "run") {
       runs[0].program = { text: request.program, times: header.times };
       headline.innerHTML = header.headline;
       // How it ended stands above the plots.
@@ -171,11 +186,30 @@ class Playground {
 
   /** The machine as it was run; edits that came since then are still to be made. */
   takeMachine(request, { machine, sliders, axes }) {
-    if (texts.machine.value === request.machine) {
-      texts.machine.value = machine;
-      this.edits = this.edits.slice(request.edits.length);
-    }
-    if (this.edits.length === 0) this.sliders.show(sliders, axes);
+    if (request.machine !== this.base) return;
+    if (texts.machine.value !== machine) texts.machine.value = machine;
+    if (request.edits.length < this.edits.length) return;
+    this.base = machine;
+    this.edits = [];
+    this.sliders.show(sliders, axes);
+    const select = element("drive").elements.axis;
+    const chosen = select.value;
+    select.replaceChildren(...axes.map((name, i) => new Option(name, i, false, String(i) === chosen)));
+  }
+
+  /** The tables of an experiment, and what tuning proposes to take. */
+  experiment({ tables, tuned }) {
+    const shown = tables.map(({ title, words: lines, head, rows }) => make("section", {},
+      make("h2", {}, title),
+      table(title, head, rows.map((row) => make("tr", {}, ...row.map((value, i) => {
+        if (typeof value === "number") return cell(figure(value, 5));
+        return head[i].startsWith("*") ? make("td", { class: "word long" }, value) : cell(value);
+      })))),
+      ...(lines.length ? [make("pre", {}, lines.join("\n"))] : [])));
+    if (!tuned) return shown;
+    const take = make("button", { type: "button", class: "take" }, "Use the tuned machine");
+    take.addEventListener("click", () => this.take("tuned.toml", tuned));
+    return [take, ...shown];
   }
 
   /** How far a request is that takes its time. */

@@ -7,17 +7,20 @@
 //! What an answer is made from stays in memory: a page starts anew when its memory has grown.
 //!
 //! - `run`: a program through plan, kernel and simulated machine;
+//! - `drive`: experiments with the drives, and their tuning;
 //! - `ramp`: one ramp of the feed law;
 //! - `sliders`: the numbers of a machine file that a page has sliders for;
 //! - `digest`: a number for all bits of a run.
 
 mod digest;
+mod drive;
 mod ramp;
 mod run;
 mod sliders;
 
 use serde::{Deserialize, Serialize};
 
+use self::drive::DriveRequest;
 use self::ramp::RampRequest;
 use self::run::RunRequest;
 
@@ -29,6 +32,8 @@ enum Request {
     Run(RunRequest),
     /// A ramp of the feed law.
     Ramp(RampRequest),
+    /// An experiment with the drives.
+    Drive(DriveRequest),
 }
 
 /// What an answer is being made of.
@@ -99,6 +104,7 @@ impl Task {
     pub fn new(request: &[u8]) -> Self {
         let begun = match serde_json::from_slice(request) {
             Ok(Request::Run(request)) => run::begin(request).map(State::Under),
+            Ok(Request::Drive(request)) => drive::begin(request).map(State::Under),
             Ok(Request::Ramp(request)) => request.answer().map(|answer| State::Answered(answer.bytes())),
             Err(error) => Err(format!("request: found {error}, expected what the page asks for")),
         };

@@ -87,6 +87,21 @@ fn refusals_name_file_line_and_what_was_found() {
 }
 
 #[test]
+fn experiments_need_x_y_and_z() {
+    let request = |machine: &str, axis: usize| json!({"do": "drive", "experiment": "step", "axis": axis, "machine_name": "m.toml", "machine": machine});
+    let (header, data) = answered(&request(REFERENCE_TOML, 2));
+    assert_eq!((&header["is_good"], data.len()), (&json!(true), 0));
+    assert_eq!(header["tables"][0]["title"], "Step of Z to 7200 mm/min, open loop");
+    let error = |request| answered(&request).0["error"].as_str().expect("an error").to_owned();
+    assert_eq!(error(request(REFERENCE_TOML, 3)), "found axis 3, expected one from 0 to 2");
+    let turned = REFERENCE_TOML.replacen("name = \"Z\"", "name = \"A\"\nletter = \"A\"", 1);
+    assert_eq!(
+        error(request(&turned, 0)),
+        "found m.toml with the axes X, Y, A, expected X, Y and Z, in this order, for experiments"
+    );
+}
+
+#[test]
 fn a_ramp_is_that_of_the_paper() {
     let request = |law: &str, from: f64| {
         json!({

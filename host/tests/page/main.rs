@@ -32,13 +32,15 @@ const TESTS: [(&str, fn()); 13] = [
 ];
 
 /// Tests that need the module, too.
-const OF_MODULE: [(&str, fn()); 8] = [
+const OF_MODULE: [(&str, fn()); 10] = [
     ("the_browser_has_the_same_bits", playground::the_browser_has_the_same_bits),
     ("it_runs_what_it_is_given", playground::it_runs_what_it_is_given),
     ("sliders_change_the_machine", playground::sliders_change_the_machine),
     ("files_are_dropped", playground::files_are_dropped),
     ("refusals_are_shown", playground::refusals_are_shown),
     ("a_long_run_is_cancelled", playground::a_long_run_is_cancelled),
+    ("drives_are_measured", playground::drives_are_measured),
+    ("axes_are_tuned", playground::axes_are_tuned),
     ("a_ramp_is_that_of_profile", playground::a_ramp_is_that_of_profile),
     ("a_phone_shows_the_playground", playground::a_phone_shows_the_playground),
 ];

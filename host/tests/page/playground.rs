@@ -350,6 +350,120 @@ pub(crate) fn a_ramp_is_that_of_profile() {
     page.browser.close();
 }
 
+/// What the page tells of an experiment, by title of the table and place in it.
+struct Told(Value);
+
+impl Told {
+    fn of(page: &Playground, experiment: &str, axis: usize) -> Self {
+        page.after(&format!(
+            "const form = document.getElementById('drive'); form.elements.experiment.value = '{experiment}'; \
+             form.elements.axis.value = '{axis}'; form.querySelector('button').click()"
+        ));
+        assert_eq!(page.status(), "");
+        let tables = "return [...document.querySelectorAll('#headline section')].map((section) => ({\
+             title: section.querySelector('h2').textContent, \
+             rows: [...section.querySelectorAll('tbody tr')].map((row) => [...row.children].map((cell) => cell.textContent))}))";
+        Self(page.browser.run(tables))
+    }
+
+    fn text(&self, table: usize, row: usize, column: usize) -> &str {
+        let text = self.0[table]["rows"][row][column].as_str();
+        text.unwrap_or_else(|| panic!("{table} {row} {column} of {}", self.0))
+    }
+
+    /// The page shows a figure in a cell.
+    fn assert_at(&self, [table, row, column]: [usize; 3], value: &Value) {
+        let shown = first_number(self.text(table, row, column));
+        if number(value).abs() > 1e-9 {
+            assert_near(shown, number(value), 5, &format!("{table} {row} {column}"));
+        } else {
+            assert!(shown.abs() <= 1e-9, "{shown}");
+        }
+    }
+}
+
+pub(crate) fn drives_are_measured() {
+    let page = Playground::new("drives", DESK);
+    page.browser.press("Drive");
+    let machine =
+        |of: &[&str]| page.workspace.json(&[&["drive"], of, &["--machine", "mine.toml", "--json"]].concat());
+    let told = Told::of(&page, "step", 1);
+    let step = machine(&["step", "--axis", "Y"]);
+    let keys = [
+        "delay_ms",
+        "time_constant_ms",
+        "overshoot_percent",
+        "settling_ms",
+        "peak_accel_m_s2",
+        "peak_jerk_m_s3",
+    ];
+    for (row, key) in keys.into_iter().enumerate() {
+        told.assert_at([0, row, 1], &step[key]);
+    }
+    let told = Told::of(&page, "harmonic", 0);
+    let harmonic = machine(&["harmonic"]);
+    for row in 0..10 {
+        let point = &harmonic["axes"][0]["points"][row];
+        for (column, key) in
+            ["frequency_hz", "swing_ratio", "fundamental_ratio", "phase_deg"].into_iter().enumerate()
+        {
+            told.assert_at([0, row, column], &point[key]);
+        }
+    }
+    let told = Told::of(&page, "circle", 0);
+    let circles = machine(&["circle", "--from", "4", "--to", "4", "--feedforward", "v,va,as-is"]);
+    for table in 0..3 {
+        let circle = &circles["feedforward"][table]["circles"][0];
+        let keys = [
+            "radius_mm",
+            "contour_error_um",
+            "form_deviation_um",
+            "following_error_x_um",
+            "following_error_y_um",
+        ];
+        for (column, key) in keys.into_iter().enumerate() {
+            told.assert_at([table, 2, 1 + column], &circle[key]);
+        }
+    }
+    let told = Told::of(&page, "inertia", 0);
+    let loads = machine(&["inertia"]);
+    for row in 0..4 {
+        told.assert_at([0, row, 5], &loads["loads"][row]["peak_accel_m_s2"]);
+        told.assert_at([0, row, 6], &loads["loads"][row]["plateau_accel_m_s2"]);
+        let acts = loads["loads"][row]["is_limited"] == true;
+        assert_eq!(told.text(0, row, 7) == "acts", acts);
+    }
+    page.browser.close();
+}
+
+pub(crate) fn axes_are_tuned() {
+    let page = Playground::new("tuning", DESK);
+    page.browser.press("Drive");
+    let told = Told::of(&page, "tune", 0);
+    let tuned =
+        page.workspace.json(&["drive", "tune", "--machine", "mine.toml", "--output", "tuned.toml", "--json"]);
+    for axis in 0..3 {
+        let changes = tuned["axes"][axis]["changes"].as_array().expect("a list");
+        assert!(changes.len() > 5);
+        for (row, change) in changes.iter().enumerate() {
+            assert_eq!(told.text(axis, row, 0), change["key"].as_str().expect("a key"));
+            assert_eq!(told.text(axis, row, 4), change["reason"].as_str().expect("a reason"));
+        }
+    }
+    let circles = tuned["verification"]["circles"].as_array().expect("a list");
+    assert_eq!(circles.len(), 12);
+    for (index, circle) in circles.iter().enumerate() {
+        let (table, row) = (3 + index / 6, index % 6);
+        told.assert_at([table, row, 1], &circle["before"]["contour_error_um"]);
+        told.assert_at([table, row, 2], &circle["after"]["contour_error_um"]);
+    }
+    // What the page takes is the file that the command writes.
+    page.after("document.querySelector('.take').click()");
+    assert_eq!(page.machine(), page.workspace.read("tuned.toml"));
+    page.assert_shows(STRINGER, &page.machine());
+    page.browser.close();
+}
+
 pub(crate) fn a_phone_shows_the_playground() {
     let page = Playground::new("phone", PHONE);
     page.assert_shows(STRINGER, REFERENCE_TOML);
