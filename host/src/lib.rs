@@ -18,6 +18,7 @@
 //!   flight     a board's log ─► TraceRow       the ticks around a fault
 //!   trace      TraceRow, RunTrace              what a run leaves behind
 //!   board      items ─► a board, and its state ◄─   over a wire, or simulated
+//!   panel      a board ◄─► tabs of a browser      an operator's view of it
 //!   axis_unit                                  mm or °
 //!   drive      Machine ─► figures of its axes     step, harmonics, circles
 //!   identify   recordings ─► drive parameters     what an axis is, from its runs
@@ -51,6 +52,8 @@ pub mod recording;
 pub mod flight;
 #[cfg(feature = "terminal")]
 pub mod board;
+#[cfg(feature = "terminal")]
+pub mod panel;
 pub mod axis_unit;
 pub mod trace;
 pub mod drive;

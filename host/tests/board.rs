@@ -65,21 +65,25 @@ fn connect(address: SocketAddr, asker: u32) -> Connection<3> {
 const ENABLES: Permissions =
     Permissions { enables: true, clears_fault: false, disables: false, found: Found::Stays };
 
+/// Names of the axes.
+fn axes() -> Arc<[String]> {
+    Arc::new(["X", "Y", "Z"].map(str::to_owned))
+}
+
 /// Drives a job to its end; `each` is called after every step of the connection.
 fn drive(
     job: &Job<3>,
     may: Permissions,
     connection: &mut Connection<3>,
-    each: impl FnMut(&mut Connection<3>, &mut Sender<'_, 3>, &[Heard<3>]) -> bool,
+    each: impl FnMut(&mut Connection<3>, &mut Sender<3>, &[Heard<3>]) -> bool,
 ) -> Result<Step, BoardError> {
-    let names = ["X", "Y", "Z"].map(str::to_owned);
-    drive_sender(Sender::new(job, &names, may), connection, each)
+    drive_sender(Sender::new(Arc::new(job.clone()), axes(), may), connection, each)
 }
 
 fn drive_sender(
-    mut sender: Sender<'_, 3>,
+    mut sender: Sender<3>,
     connection: &mut Connection<3>,
-    mut each: impl FnMut(&mut Connection<3>, &mut Sender<'_, 3>, &[Heard<3>]) -> bool,
+    mut each: impl FnMut(&mut Connection<3>, &mut Sender<3>, &[Heard<3>]) -> bool,
 ) -> Result<Step, BoardError> {
     let begin = Instant::now();
     loop {
@@ -282,8 +286,7 @@ fn a_program_is_planned_while_it_is_driven() {
     let text = zigzag(300);
     let whole = job(&text, &machine);
     let (_board, address) = board(&machine, 21);
-    let names = ["X", "Y", "Z"].map(str::to_owned);
-    let job = Job::<3>::in_planning(&machine, 7);
+    let job = Arc::new(Job::<3>::in_planning(&machine, 7));
     let planned = |text: &str| {
         let source = Source {
             name: "part.ngc".to_owned(),
@@ -294,7 +297,7 @@ fn a_program_is_planned_while_it_is_driven() {
         InPlanning::begin::<f32, 3>(source, &machine)
     };
     let mut connection = connect(address, 1);
-    let sender = Sender::planned(&job, planned(&text), &names, ENABLES);
+    let sender = Sender::planned(Arc::clone(&job), planned(&text), axes(), ENABLES);
     let given_up = drive_sender(sender, &mut connection, |connection, sender, _| {
         sender.step() == Step::Drives && connection.next().is_some_and(|next| next > 300)
     });
@@ -302,7 +305,7 @@ fn a_program_is_planned_while_it_is_driven() {
     drop(connection);
     let mut connection = connect(address, 2);
     let continued = Permissions { found: Found::Continued, ..ENABLES };
-    let sender = Sender::planned(&job, planned(&text), &names, continued);
+    let sender = Sender::planned(Arc::clone(&job), planned(&text), axes(), continued);
     assert_eq!(drive_sender(sender, &mut connection, |_, _, _| false).expect("driven"), Step::Done);
     assert_eq!(stands(&connection), end(&whole));
     // Each item once, and the end.
@@ -319,15 +322,18 @@ fn a_program_is_planned_while_it_is_driven() {
         leaves_out_outputs: false,
     };
     let beyond = InPlanning::begin::<f32, 3>(source, &narrow);
-    let refused =
-        drive_sender(Sender::planned(&job, beyond, &names, ENABLES), &mut connection, |_, _, _| false);
+    let refused = drive_sender(
+        Sender::planned(Arc::clone(&job), beyond, axes(), ENABLES),
+        &mut connection,
+        |_, _, _| false,
+    );
     let Err(BoardError::Program(error)) = refused else { panic!("{refused:?}") };
     assert!(error.to_string().starts_with("part.ngc:4:"), "{error}");
     assert_eq!(stands(&connection).map(Position::to_mm), [2.0, 1.0, 0.0]);
     assert_eq!(connection.status().map(|status| status.state), Some(State::Idle));
 
     let wrong = text.replace("M2", "G1 X0 Y0\nG1 X5 Q");
-    let sender = Sender::planned(&job, planned(&wrong), &names, ENABLES);
+    let sender = Sender::planned(Arc::clone(&job), planned(&wrong), axes(), ENABLES);
     let refused = drive_sender(sender, &mut connection, |_, _, _| false);
     let Err(BoardError::Program(error)) = refused else { panic!("{refused:?}") };
     assert!(error.to_string().starts_with("part.ngc:303:"), "{error}");
@@ -516,8 +522,8 @@ fn a_jog_ends_by_itself_by_its_release_or_by_the_dead_man() {
     let _board = simulator::listen(&machine, 30, listener, 5.0).expect("a board");
     let presses = ["Y+3", "X+400@2000", "X+400", "X-1"].map(|press| press.parse::<Press>().expect("a press"));
     let keys = Keys::new(&machine, &presses, Some(FEED_MM_S)).expect("keys");
-    let (job, axes) = (Job::<3>::new(&machine, &[]), ["X", "Y", "Z"].map(str::to_owned));
-    let jogs = Jogs { keys: &keys, job: &job, axes: &axes, may: ENABLES, dead_man_ms: DEAD_MAN_MS };
+    let job = Arc::new(Job::<3>::new(&machine, &[]));
+    let jogs = Jogs { keys: &keys, job, axes: axes(), may: ENABLES, dead_man_ms: DEAD_MAN_MS };
     let cable = Cable::to(address);
     let mut connection = connect(cable.address, 30);
     let first = jogs.press(0, &mut connection, &mut || false).expect("a jog");

@@ -216,8 +216,8 @@ fn drive(
     });
     let mut connection = Connection::<3>::open(open, session).expect("a board");
     let may = Permissions { enables: true, clears_fault: false, disables: false, found: Found::Stays };
-    let names = ["X", "Y", "Z"].map(str::to_owned);
-    let mut sender = Sender::new(job, &names, may);
+    let names = Arc::new(["X", "Y", "Z"].map(str::to_owned));
+    let mut sender = Sender::new(Arc::new(job.clone()), names, may);
     let mut progress = Progress::new(job.begin.path, job.header.tick_s);
     let (mut told, mut journal, period) = (Vec::new(), job.begin.path, 1 + random.below(200));
     loop {

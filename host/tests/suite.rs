@@ -19,6 +19,8 @@ mod gcode;
 mod limit_share;
 mod mutation;
 mod nurbs;
+mod operated;
+mod panel;
 mod probing;
 mod outputs;
 mod resume;

@@ -123,7 +123,8 @@ impl<const N: usize> Connection<N> {
     }
 
     /// Whether the board has confirmed what the operator wants.
-    fn is_settled(&self) -> bool {
+    #[must_use]
+    pub fn is_settled(&self) -> bool {
         self.link.next().is_some() && !self.is_lost && self.link.is_controlled()
     }
 

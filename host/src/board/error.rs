@@ -7,7 +7,11 @@ use motion_kernel::link::{Identity, PROTOCOL, PushError, WriteError};
 use motion_kernel::program::ProgramError;
 use thiserror::Error;
 
+use super::operated::CAPTURE_MAX;
 use super::scope::ScopeError;
+use super::trigger::Condition;
+use crate::simulate::RunError;
+use crate::simulate::jog::JogError;
 
 /// What a board and a program have to agree on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -145,6 +149,36 @@ pub enum BoardError {
     /// What it has are no parameters.
     #[error("found parameters on the board that can't be read: {0}")]
     NoParameters(ProgramError),
+    /// Something is under way.
+    #[error("found a program or a jog under way, expected the machine to have nothing to do")]
+    UnderWay,
+    /// Nothing is under way.
+    #[error("found nothing to go on with, expected a program under way")]
+    NothingUnderWay,
+    /// There is no program.
+    #[error("found no program, expected one to be loaded")]
+    NoProgram,
+    /// It would be too fast.
+    #[error("found an override of {} %, expected at most 200 %", f64::from(*.permille) / 10.0)]
+    Override {
+        /// What was asked for \[0.1 %\].
+        permille: u16,
+    },
+    /// There is no such key.
+    #[error("found a key {0}")]
+    Key(#[from] JogError),
+    /// The trigger's axis is none of the machine.
+    #[error("found the trigger {0}, expected an axis of the machine")]
+    Trigger(Condition),
+    /// Too many ticks are to be captured.
+    #[error("found {ticks} ticks to capture, expected less than {CAPTURE_MAX}")]
+    Capture {
+        /// How many were asked for.
+        ticks: usize,
+    },
+    /// The machine can't be simulated.
+    #[error("{0}")]
+    Simulator(#[from] RunError),
     /// An item can't be sent.
     #[error("found an item that can't be sent: {0}")]
     Push(PushError),
@@ -180,6 +214,7 @@ impl BoardError {
             | Self::Replaced
             | Self::Moves
             | Self::NoParameters(_)
+            | Self::Simulator(_)
             | Self::Scope(_)
             | Self::Push(_) => false,
             Self::Disagrees { .. }
@@ -191,6 +226,13 @@ impl BoardError {
             | Self::Program(_)
             | Self::Interrupted { .. }
             | Self::Parameters(_)
+            | Self::UnderWay
+            | Self::NothingUnderWay
+            | Self::NoProgram
+            | Self::Override { .. }
+            | Self::Key(_)
+            | Self::Trigger(_)
+            | Self::Capture { .. }
             | Self::NoWay(_)
             | Self::Jog(_) => true,
         }

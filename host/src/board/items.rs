@@ -3,6 +3,7 @@
 use std::cell::Cell;
 use std::collections::VecDeque;
 use std::error::Error;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::thread;
 
@@ -11,7 +12,7 @@ use motion_kernel::program::Item;
 use motion_kernel::units::Position;
 
 use super::error::BoardError;
-use super::job::piece;
+use super::job::{Job, piece};
 use crate::gcode::{ReadOptions, Reading};
 use crate::machine::Machine;
 use crate::planning::{Stream, Streamed, assumed_path, first_axes, notes, require_outputs};
@@ -30,8 +31,8 @@ enum Planned<const M: usize> {
 }
 
 /// The items, in their order.
-pub(super) enum Items<'a, const M: usize> {
-    Whole { items: &'a [Item<M>], next: usize },
+pub(super) enum Items<const M: usize> {
+    Whole { job: Arc<Job<M>>, next: usize },
     Planned(Box<InPlanning<M>>),
 }
 
@@ -204,11 +205,11 @@ fn plan<R: Real, const N: usize, const M: usize>(
     Ok(())
 }
 
-impl<const M: usize> Items<'_, M> {
+impl<const M: usize> Items<M> {
     /// What there is next.
     pub(super) fn next(&mut self) -> Next<'_, M> {
         match self {
-            Self::Whole { items, next } => items.get(*next).map_or(Next::End, Next::Item),
+            Self::Whole { job, next } => job.items.get(*next).map_or(Next::End, Next::Item),
             Self::Planned(planned) => planned.next(),
         }
     }
@@ -231,7 +232,7 @@ impl<const M: usize> Items<'_, M> {
     /// How many there are, where that is known.
     pub(super) fn count(&self) -> Option<usize> {
         match self {
-            Self::Whole { items, .. } => Some(items.len()),
+            Self::Whole { job, .. } => Some(job.items.len()),
             Self::Planned(_) => None,
         }
     }
@@ -239,9 +240,7 @@ impl<const M: usize> Items<'_, M> {
     /// The program line of the first piece of path from an item on; none where it is not known any more, or not yet.
     pub(super) fn line_of(&self, item: u32) -> Option<u32> {
         match self {
-            Self::Whole { items, .. } => {
-                items.get(item as usize..)?.iter().find_map(piece).map(|(line, _)| line)
-            }
+            Self::Whole { job, .. } => job.line_of(item),
             Self::Planned(planned) => planned.line_of(item as usize),
         }
     }

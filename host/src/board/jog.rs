@@ -3,10 +3,10 @@
 //! Consumes [`Keys`]; produces, for each, a program of one line for the board. The board has a dead man: where nothing comes
 //! from here for that time, it holds by itself.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use motion_kernel::link::{Event, State, Status};
-use motion_kernel::units::Position;
 
 use super::connection::{Connection, Heard};
 use super::error::BoardError;
@@ -19,9 +19,9 @@ pub struct Jogs<'a, const N: usize, const M: usize> {
     /// The keys.
     pub keys: &'a Keys<'a, N>,
     /// A job of the machine without items.
-    pub job: &'a Job<M>,
+    pub job: Arc<Job<M>>,
     /// Names of the machine's axes, for errors.
-    pub axes: &'a [String],
+    pub axes: Arc<[String]>,
     /// What may be done for it.
     pub may: Permissions,
     /// After so long a silence the board holds \[ms\], above 0.
@@ -41,8 +41,9 @@ impl<const N: usize, const M: usize> Jogs<'_, N, M> {
         is_released: &mut dyn FnMut() -> bool,
     ) -> Result<Jogged, BoardError> {
         let (axis, press) = self.keys.key(key);
-        let jog = |start: [Position; M]| self.keys.on_board(key, start);
-        let mut sender = Sender::new(self.job, self.axes, self.may).jogs(&jog, self.dead_man_ms);
+        let wanted = self.keys.wanted(key);
+        let mut sender = Sender::new(Arc::clone(&self.job), Arc::clone(&self.axes), self.may)
+            .jogs(wanted, self.dead_man_ms);
         let mut seen: Option<Seen<M>> = None;
         let mut released: Option<Status<M>> = None;
         let (mut has_moved, mut is_held) = (false, false);
@@ -99,7 +100,7 @@ impl<const N: usize, const M: usize> Jogs<'_, N, M> {
                         ticks: u64::from(status.tick.wrapping_sub(from.tick)),
                         length_mm: (status.set[axis] - from.set[axis]).to_mm().abs(),
                     },
-                    None if self.keys.on_board(key, seen.first.set).is_ok_and(|jog| jog.ends_at_limit()) => {
+                    None if wanted.on_board(seen.first.set).is_ok_and(|jog| jog.ends_at_limit()) => {
                         Ended::SoftLimit
                     }
                     None => Ended::Distance,

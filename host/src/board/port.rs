@@ -4,7 +4,7 @@ use std::fmt;
 use std::io;
 use std::net::{TcpStream, ToSocketAddrs};
 use std::str::FromStr;
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use super::wire::{Serial, Tcp, Wire};
 
@@ -79,6 +79,13 @@ impl Port {
             Self::Simulator => Err(io::Error::other("no wire")),
         }
     }
+}
+
+/// A number that no other start has: of the time.
+#[must_use]
+pub fn unique() -> u32 {
+    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    now.as_secs() as u32 ^ now.subsec_nanos().rotate_left(2)
 }
 
 #[cfg(test)]

@@ -3,20 +3,20 @@
 //! Consumes what is heard of a [`Connection`]; produces the link's commands and items, one [`Sender::advance`] after the
 //! other, and never waits.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use motion_kernel::hal::{BoardOutputs, Spindle};
-use motion_kernel::jog::{Jog, JogError};
 use motion_kernel::link::{Event, Identity, Mode, PROTOCOL, State, Status};
 use motion_kernel::program::{FORMAT, Item};
 use motion_kernel::straight::Straight;
-use motion_kernel::units::Position;
 
 use super::connection::{ANSWER, Connection, Heard};
 use super::error::{Agreement, BoardError};
 use super::items::{InPlanning, Items, Next, Said};
 use super::job::Job;
 use crate::simulate::faults;
+use crate::simulate::jog::WantedJog;
 
 /// The longest time for drives to go on.
 const ENABLE: Duration = Duration::from_secs(5);
@@ -73,20 +73,17 @@ pub enum Step {
     Aborted,
 }
 
-/// Makes a jog from where the machine stands.
-pub type MakeJog<'a, const M: usize> = &'a dyn Fn([Position; M]) -> Result<Jog<M>, JogError>;
-
 /// Drives a job.
-pub struct Sender<'a, const M: usize> {
-    job: &'a Job<M>,
-    items: Items<'a, M>,
+pub struct Sender<const M: usize> {
+    job: Arc<Job<M>>,
+    items: Items<M>,
     /// Items that the board has from another sender, which are to be skipped.
     skips: u32,
     /// The end of the program under way is pushed.
     is_ended: bool,
     outputs: OutputCheck,
     /// Names of the machine's axes, for errors.
-    axes: &'a [String],
+    axes: Arc<[String]>,
     may: Permissions,
     step: Step,
     since: Instant,
@@ -96,25 +93,26 @@ pub struct Sender<'a, const M: usize> {
     /// where that has switched something: between two programs all is off.
     way: Vec<Item<M>>,
     /// All there is to drive is a jog, with a dead man.
-    jog: Option<(MakeJog<'a, M>, u16)>,
+    jog: Option<(WantedJog, u16)>,
     /// Items pushed of the program under way, its end among them.
     pushed: usize,
 }
 
-impl<'a, const M: usize> Sender<'a, M> {
+impl<const M: usize> Sender<M> {
     /// Before the greeting.
     #[must_use]
-    pub fn new(job: &'a Job<M>, axes: &'a [String], may: Permissions) -> Self {
-        Self::of(job, Items::Whole { items: &job.items, next: 0 }, axes, may)
+    pub fn new(job: Arc<Job<M>>, axes: Arc<[String]>, may: Permissions) -> Self {
+        let items = Items::Whole { job: Arc::clone(&job), next: 0 };
+        Self::of(job, items, axes, may)
     }
 
     /// The same of a job whose items are planned while they are driven.
     #[must_use]
-    pub fn planned(job: &'a Job<M>, planned: InPlanning<M>, axes: &'a [String], may: Permissions) -> Self {
+    pub fn planned(job: Arc<Job<M>>, planned: InPlanning<M>, axes: Arc<[String]>, may: Permissions) -> Self {
         Self::of(job, Items::Planned(Box::new(planned)), axes, may)
     }
 
-    fn of(job: &'a Job<M>, items: Items<'a, M>, axes: &'a [String], may: Permissions) -> Self {
+    fn of(job: Arc<Job<M>>, items: Items<M>, axes: Arc<[String]>, may: Permissions) -> Self {
         Self {
             job,
             items,
@@ -139,7 +137,7 @@ impl<'a, const M: usize> Sender<'a, M> {
 
     /// Drives a jog and nothing else, which is a way of its own. After a silence of `dead_man_ms` the board holds.
     #[must_use]
-    pub fn jogs(self, jog: MakeJog<'a, M>, dead_man_ms: u16) -> Self {
+    pub fn jogs(self, jog: WantedJog, dead_man_ms: u16) -> Self {
         Self { jog: Some((jog, dead_man_ms)), ..self }
     }
 
@@ -202,8 +200,8 @@ impl<'a, const M: usize> Sender<'a, M> {
         };
         match *event {
             Event::Replaced => Err(BoardError::Replaced),
-            Event::Welcome(identity) => check(self.job, &identity),
-            Event::Refused(identity) => check(self.job, &identity).and(Err(BoardError::Silent)),
+            Event::Welcome(identity) => check(&self.job, &identity),
+            Event::Refused(identity) => check(&self.job, &identity).and(Err(BoardError::Silent)),
             Event::Restarted { confirmed } => {
                 let of_program =
                     if self.step == Step::Drives { self.of_job(confirmed).unwrap_or(0) } else { 0 };
@@ -337,7 +335,8 @@ impl<'a, const M: usize> Sender<'a, M> {
     fn approach(&mut self, status: &Status<M>, connection: &mut Connection<M>) -> Result<(), BoardError> {
         (self.pushed, self.is_ended) = (0, false);
         if let Some((jog, dead_man_ms)) = self.jog {
-            self.way = jog(status.set)
+            self.way = jog
+                .on_board(status.set)
                 .map_err(BoardError::Jog)?
                 .map(|item| item.unwrap_or_else(|never| match never {}))
                 .collect();

@@ -10,8 +10,8 @@ use clap::Args;
 
 use super::error::{CliError, Outcome};
 use super::input;
-use super::port::number;
 use crate::board::emulated::{Core, Emulated, EmulatedError};
+use crate::board::port::unique;
 use crate::board::{job, simulator};
 use crate::files::interrupt;
 use crate::machine::{Machine, on_machine};
@@ -67,7 +67,7 @@ pub fn run(arguments: &BoardArguments, out: &mut dyn Write) -> Result<Outcome, C
         return on_machine!(machine, machine => emulate(arguments, core, machine, address, out));
     }
     on_machine!(machine, machine => {
-        let board = simulator::listen(machine, number(), listener, 1.0)
+        let board = simulator::listen(machine, unique(), listener, 1.0)
             .map_err(|source| CliError::Run { program: machine.name.clone(), source })?;
         writeln!(out, "machine {:?} at tcp:{address}", machine.name)
             .and_then(|()| out.flush())
@@ -91,7 +91,7 @@ fn emulate<const N: usize>(
     let image = arguments.image.clone().unwrap_or_else(|| core.image());
     let record = job::parameters::<N, 3>(machine);
     interrupt::hold_first();
-    let mut emulated = Emulated::start(core, &image, &record, number(), address)?;
+    let mut emulated = Emulated::start(core, &image, &record, unique(), address)?;
     // Until it takes connections, or has ended.
     while TcpStream::connect(address).is_err() && !emulated.has_ended().map_err(EmulatedError::Emulator)? {
         thread::sleep(Duration::from_millis(20));

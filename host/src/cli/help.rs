@@ -17,7 +17,7 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ("Run it on simulated axes", &["run", "replay", "page"]),
     (
         "Drive a machine through a board",
-        &["send", "resume", "watch", "parameters", "compile", "flight", "board"],
+        &["send", "resume", "panel", "watch", "parameters", "compile", "flight", "board"],
     ),
     ("Move axes by hand", &["jog", "home"]),
     ("Set up a machine, its drives, its law", &["machine", "drive", "profile", "spline"]),

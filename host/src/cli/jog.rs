@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
 use motion_kernel::num::Root;
@@ -184,11 +185,11 @@ impl<const N: usize> OnBoard for OnKeys<'_, N> {
     /// Presses the keys, which Ctrl-C releases.
     fn run<R: Root + Send, const M: usize>(self, mut connection: Connection<M>) -> Result<Outcome, CliError> {
         let Self { machine, arguments, port, keys, dead_man_ms, out } = self;
-        let job = Job::<M>::new(machine, &[]);
-        let axes: Vec<String> = machine.driven_axes().iter().map(|axis| axis.name.clone()).collect();
+        let job = Arc::new(Job::<M>::new(machine, &[]));
+        let axes = machine.driven_axes().iter().map(|axis| axis.name.clone()).collect();
         let found = if arguments.restart { Found::GivenUp } else { Found::Stays };
         let may = Permissions { enables: arguments.enable, found, ..Permissions::default() };
-        let jogs = Jogs { keys, job: &job, axes: &axes, may, dead_man_ms };
+        let jogs = Jogs { keys, job, axes, may, dead_man_ms };
         let (mut jogged, mut is_released, mut ended) = (Vec::new(), false, Ok(()));
         interrupt::hold_first();
         for key in 0..keys.count() {

@@ -34,6 +34,7 @@
 //! - [`send`]: a program on a board, over a wire;
 //! - [`send::resume`]: a program after a power cut;
 //! - [`watch`]: what a board does;
+//! - [`panel`]: an operator's panel in the browser;
 //! - [`parameters`]: a board's parameters;
 //! - [`board`]: a board with the simulated machine;
 //! - [`home`]: the simulated axes find their references;
@@ -58,6 +59,7 @@ pub mod home;
 pub mod jog;
 pub mod machine;
 pub mod page;
+pub mod panel;
 pub mod parameters;
 pub mod plan;
 pub mod profile;
@@ -108,6 +110,7 @@ Examples:
   motion send part.ngc --port /dev/ttyACM0 --from-line 120
                                                  from the path of line 120 on
   motion resume --port /dev/ttyACM0              goes on after a power cut
+  motion panel --port /dev/ttyACM0               an operator's panel in the browser
   motion watch --port /dev/ttyACM0               what the board does
   motion parameters diff --port /dev/ttyACM0 --machine mine.toml
                                                  what the board and the file have not in common
@@ -155,6 +158,7 @@ enum Command {
     Send(send::SendArguments),
     Resume(send::resume::ResumeArguments),
     Watch(watch::WatchArguments),
+    Panel(panel::PanelArguments),
     Parameters(parameters::ParametersArguments),
     Board(board::BoardArguments),
     Home(home::HomeArguments),
@@ -211,6 +215,7 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
         Some(Command::Send(arguments)) => send::send(arguments, out),
         Some(Command::Resume(arguments)) => send::resume::resume(arguments, out),
         Some(Command::Watch(arguments)) => watch::watch(arguments, out),
+        Some(Command::Panel(arguments)) => panel::run(arguments, out),
         Some(Command::Parameters(arguments)) => parameters::run(arguments, out),
         Some(Command::Board(arguments)) => board::run(arguments, out),
         Some(Command::Home(arguments)) => home::run(arguments, out),

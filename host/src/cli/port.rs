@@ -1,15 +1,14 @@
 //! A board at a port, for the commands that talk to one.
 
-use std::time::{SystemTime, UNIX_EPOCH};
-
 use clap::Args;
 use motion_kernel::num::{Fixed, Root};
 
 use super::error::{CliError, Outcome};
+use crate::board::port::unique;
 use crate::board::sender::{Found, Permissions};
 use crate::board::simulator::{self, SimulatedBoard};
 use crate::board::wire::Wire;
-use crate::board::{BoardError, Connection, Port};
+use crate::board::{Board, BoardError, Connection, Port, operated};
 use crate::machine::Machine;
 use crate::planning::on_axis_count;
 
@@ -64,6 +63,15 @@ impl OptionalPort {
     }
 }
 
+impl OptionalPort {
+    /// The board there, or the simulated one.
+    pub(super) fn operated<const N: usize>(&self, machine: &Machine<N>) -> Result<Box<dyn Board>, CliError> {
+        let port = self.port.clone().unwrap_or(Port::Simulator);
+        operated::open(machine, &port, self.baud)
+            .map_err(|source| CliError::Board { port: port.to_string(), source })
+    }
+}
+
 impl PortArguments {
     /// An error at this port.
     pub(super) fn refused(&self, source: BoardError) -> CliError {
@@ -75,11 +83,11 @@ impl PortArguments {
         &self,
         machine: &Machine<N>,
     ) -> Result<(Connection<N>, SimulatedBoard), CliError> {
-        let (board, wire) = simulator::start(machine, number(), 1.0)
+        let (board, wire) = simulator::start(machine, unique(), 1.0)
             .map_err(|source| CliError::Run { program: machine.name.clone(), source })?;
         let mut wire = Some(Box::new(wire) as Box<dyn Wire>);
         let open = Box::new(move || wire.take().ok_or_else(|| std::io::ErrorKind::BrokenPipe.into()));
-        let connection = Connection::open(open, number()).map_err(|error| self.refused(error.into()))?;
+        let connection = Connection::open(open, unique()).map_err(|error| self.refused(error.into()))?;
         Ok((connection, board))
     }
 
@@ -108,7 +116,7 @@ impl PortArguments {
     pub(super) fn open<const M: usize>(&self) -> Result<Connection<M>, CliError> {
         let (port, baud) = (self.port.clone(), self.baud);
         let open = Box::new(move || port.open(baud));
-        Connection::open(open, number()).map_err(|error| self.refused(error.into()))
+        Connection::open(open, unique()).map_err(|error| self.refused(error.into()))
     }
 }
 
@@ -116,10 +124,4 @@ impl PortArguments {
 pub(super) trait OnBoard {
     /// With a board of `M` axes, whose kernel is of the number type `R`.
     fn run<R: Root + Send, const M: usize>(self, connection: Connection<M>) -> Result<Outcome, CliError>;
-}
-
-/// A number that no other start has: of the time.
-pub(super) fn number() -> u32 {
-    let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    now.as_secs() as u32 ^ now.subsec_nanos().rotate_left(2)
 }

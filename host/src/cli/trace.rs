@@ -8,11 +8,11 @@ use clap::Args;
 
 use super::csv_failure;
 use super::error::CliError;
-use crate::axis_unit::AxisUnit;
 use crate::files::STANDARD_INPUT;
 use crate::simulate::RunInfo;
 use crate::simulate::live::{Due, When};
-use crate::trace::{AxisTick, TraceRow};
+use crate::trace::TraceRow;
+use crate::trace::columns::{AXIS_COLUMNS, AxisColumn, CHANGE, POSITION, TIME, VELOCITY};
 
 /// Columns of the path, then seven of each axis that there is.
 const PATH_COLUMNS: [(&str, PathColumn); 8] = [
@@ -45,45 +45,6 @@ enum Column {
     Path(PathColumn),
     /// An axis, and which of [`AXIS_COLUMNS`].
     Axis(usize, usize),
-}
-
-// Decimals. A position step is 2⁻³² mm = 2.3·10⁻¹⁰ mm, a step of the converter 0.3 mV.
-const TIME: usize = 9;
-const POSITION: usize = 10;
-const VELOCITY: usize = 9;
-const CHANGE: usize = 6;
-const ERROR: usize = 6;
-const VOLTS: usize = 6;
-
-/// A column of an axis.
-pub(super) struct AxisColumn {
-    /// Its name without the unit.
-    pub(super) quantity: &'static str,
-    /// The unit of an axis that counts in this.
-    unit: fn(AxisUnit) -> String,
-    decimals: usize,
-    /// Its value.
-    pub(super) of: fn(&AxisTick) -> f64,
-}
-
-/// The columns of an axis.
-pub(super) const AXIS_COLUMNS: [AxisColumn; 7] = [
-    axis_column("set", |unit| unit.name().to_owned(), POSITION, |tick| tick.set_mm),
-    axis_column("vel", |unit| format!("{}_s", unit.name()), VELOCITY, |tick| tick.vel_mm_s),
-    axis_column("acc", |unit| format!("{}_s2", unit.name()), CHANGE, |tick| tick.acc_mm_s2),
-    axis_column("jerk", |unit| format!("{}_s3", unit.name()), CHANGE, |tick| tick.jerk_mm_s3),
-    axis_column("act", |unit| unit.name().to_owned(), POSITION, |tick| tick.act_mm),
-    axis_column("err", |unit| unit.thousandth_name().to_owned(), ERROR, |tick| tick.err_um),
-    axis_column("out", |_| "v".to_owned(), VOLTS, |tick| tick.out_v),
-];
-
-const fn axis_column(
-    quantity: &'static str,
-    unit: fn(AxisUnit) -> String,
-    decimals: usize,
-    of: fn(&AxisTick) -> f64,
-) -> AxisColumn {
-    AxisColumn { quantity, unit, decimals, of }
 }
 
 /// The trace that is asked for.

@@ -11,7 +11,7 @@ use super::error::{CliError, Outcome};
 use super::parameters::identity;
 use super::port::PortArguments;
 use super::scope::ScopeArguments;
-use super::send::state_words;
+use crate::board::interface::state_words;
 use crate::board::{BoardError, Connection, Heard, Scope};
 use crate::files::interrupt;
 use crate::gcode::Axis;

@@ -64,6 +64,12 @@ pub fn page_parts<const N: usize>(trace: &RunTrace<N>) -> io::Result<(String, Pa
     Ok((headline(trace, &summary), PageRun::with_summary(trace, &summary)?))
 }
 
+/// The page of an operator's panel, which has its data from its server.
+#[must_use]
+pub fn panel_page() -> String {
+    page::panel()
+}
+
 /// What the run came to, in words and tables.
 fn headline<const N: usize>(trace: &RunTrace<N>, summary: &Summary) -> String {
     let outcome = outcome(trace, summary);

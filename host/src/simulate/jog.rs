@@ -248,6 +248,41 @@ fn within_travel<const N: usize>(machine: &Machine<N>, axis: usize) -> JogAxis {
     JogAxis { travel, ..jog_axis(machine, axis) }
 }
 
+/// A jog that a board is asked for, before it is known where the machine stands.
+#[derive(Clone, Copy, Debug)]
+pub struct WantedJog {
+    axis: JogAxis,
+    /// The number of the axis, from 0.
+    number: usize,
+    target: JogTarget,
+    feed_mm_s: f64,
+    tick_s: f64,
+}
+
+impl WantedJog {
+    /// Of the axis with this number, from 0.
+    #[must_use]
+    pub fn new<const N: usize>(
+        machine: &Machine<N>,
+        number: usize,
+        target: JogTarget,
+        feed_mm_s: f64,
+    ) -> Self {
+        Self { axis: within_travel(machine, number), number, target, feed_mm_s, tick_s: machine.tick_s }
+    }
+
+    /// The jog of a board of `M` axes that stands at `start`.
+    ///
+    /// # Errors
+    /// The kernel refuses it.
+    pub fn on_board<const M: usize>(
+        &self,
+        start: [Position; M],
+    ) -> Result<Jog<M>, motion_kernel::jog::JogError> {
+        Jog::new(&self.axis, self.number, start, self.target, self.feed_mm_s, self.tick_s)
+    }
+}
+
 /// Keys of a machine, each at a feed that its axis has.
 #[derive(Clone, Debug)]
 pub struct Keys<'a, const N: usize = 3> {
@@ -313,27 +348,14 @@ impl<'a, const N: usize> Keys<'a, N> {
         self.machine.axes[self.presses[key].0].unit()
     }
 
-    /// The jog of a key on a board of `M` axes that stands at `start`.
-    ///
-    /// # Errors
-    /// The kernel refuses it.
+    /// What a key asks a board for.
     ///
     /// # Panics
     /// There are fewer keys.
-    pub fn on_board<const M: usize>(
-        &self,
-        key: usize,
-        start: [Position; M],
-    ) -> Result<Jog<M>, motion_kernel::jog::JogError> {
+    #[must_use]
+    pub fn wanted(&self, key: usize) -> WantedJog {
         let (axis, feed_mm_s, press) = self.presses[key];
-        Jog::new(
-            &within_travel(self.machine, axis),
-            axis,
-            start,
-            press.target,
-            feed_mm_s,
-            self.machine.tick_s,
-        )
+        WantedJog::new(self.machine, axis, press.target, feed_mm_s)
     }
 
     /// Presses them one after the other, from where the machine is switched on; what came of each into

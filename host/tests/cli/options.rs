@@ -12,6 +12,22 @@ fn wrong(workspace: &Workspace, arguments: &[&str]) -> String {
     String::from_utf8(output.stderr).expect("UTF-8")
 }
 
+/// A panel that others could reach needs a token; a board that is not there is named.
+#[test]
+fn a_panel_is_for_this_computer_unless_there_is_a_token() {
+    let workspace = Workspace::new("panel");
+    let refusal = wrong(&workspace, &["panel", "--listen", "0.0.0.0:0"]);
+    assert!(refusal.contains("found --listen 0.0.0.0:0 without --token"), "{refusal}");
+    let refusal = wrong(&workspace, &["panel", "--listen", "0.0.0.0:0", "--token", "a&b"]);
+    assert!(refusal.contains("found `a&b`, expected letters and digits"), "{refusal}");
+    let refusal = wrong(&workspace, &["panel", "--listen", "nowhere"]);
+    assert!(refusal.contains("--listen nowhere: found"), "{refusal}");
+    let output = workspace.motion(&["panel", "--listen", "127.0.0.1:0", "--port", "tcp:127.0.0.1:1"]);
+    assert_eq!(output.status.code(), Some(1));
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(told.contains("tcp:127.0.0.1:1: found"), "{told}");
+}
+
 /// A moment is a tick, a time, or a program line.
 #[test]
 fn commands_are_given_at_ticks_times_and_lines() {

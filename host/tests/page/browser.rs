@@ -29,7 +29,12 @@ pub(crate) fn missing() -> Option<String> {
 
 impl Browser {
     /// Opens a page in a window of this size [px], and waits until its script has made it.
-    pub(crate) fn open(page: &Path, [width, height]: [u32; 2]) -> Self {
+    pub(crate) fn open(page: &Path, size: [u32; 2]) -> Self {
+        Self::open_address(&format!("file://{}", page.display()), size)
+    }
+
+    /// The same of an address.
+    pub(crate) fn open_address(address: &str, [width, height]: [u32; 2]) -> Self {
         let mut driver = Command::new("chromedriver")
             .arg("--port=0")
             .stdout(Stdio::piped())
@@ -66,7 +71,7 @@ impl Browser {
             json!({"cmd": "Emulation.setDeviceMetricsOverride", "params": metrics}),
         );
         browser.call("timeouts", json!({"script": 60_000}));
-        browser.call("url", json!({"url": format!("file://{}", page.display())}));
+        browser.call("url", json!({"url": address}));
         let state = browser.wait_for("return document.documentElement.dataset.state || null");
         assert_eq!(state, "ready", "{:?}", browser.complaints());
         browser

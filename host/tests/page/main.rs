@@ -6,6 +6,7 @@
 mod browser;
 mod made_up;
 mod playground;
+mod panel;
 mod report;
 #[allow(dead_code, reason = "the suite uses the rest of it")]
 #[path = "../cli/workspace.rs"]
@@ -15,7 +16,7 @@ use std::process::ExitCode;
 
 use libtest_mimic::{Arguments, Failed, Trial};
 
-const TESTS: [(&str, fn()); 13] = [
+const TESTS: [(&str, fn()); 16] = [
     ("a_long_run_is_told_in_samples", made_up::a_long_run_is_told_in_samples),
     ("pyramids_neither_lose_nor_invent_peaks", made_up::pyramids_neither_lose_nor_invent_peaks),
     ("late_logs_with_gaps_and_rotary_axes_are_shown", made_up::late_logs_with_gaps_and_rotary_axes_are_shown),
@@ -29,6 +30,9 @@ const TESTS: [(&str, fn()); 13] = [
     ("two_runs_lie_beside_each_other", report::two_runs_lie_beside_each_other),
     ("faults_and_commands_are_marked", report::faults_and_commands_are_marked),
     ("a_phone_shows_all_of_it", report::a_phone_shows_all_of_it),
+    ("a_program_is_driven_from_the_panel", panel::a_program_is_driven_from_the_panel),
+    ("a_key_jogs_while_it_is_down", panel::a_key_jogs_while_it_is_down),
+    ("tabs_share_a_machine_and_come_back_to_it", panel::tabs_share_a_machine_and_come_back_to_it),
 ];
 
 /// Tests that need the module, too.

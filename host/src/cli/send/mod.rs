@@ -4,10 +4,10 @@ mod confirm;
 mod journal;
 pub mod resume;
 mod shown;
-mod stops;
 
 use std::io::{self, BufRead, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -21,8 +21,6 @@ use self::confirm::Middle;
 use self::journal::{Journal, Subject};
 use self::resume::Resumed;
 use self::shown::Shown;
-pub(super) use self::shown::state_words;
-use self::stops::Stops;
 use super::error::{CliError, Outcome};
 use super::input;
 use super::port::{DriveArguments, OnBoard, PortArguments};
@@ -31,6 +29,7 @@ use crate::board::from_line::from_line;
 use crate::board::items::{Said, Source};
 use crate::board::progress::{Place, Progress};
 use crate::board::sender::{Found, check, check_outputs};
+use crate::board::stops::Stops;
 use crate::board::{BoardError, Connection, Heard, InPlanning, Job, Sender, Step};
 use crate::files::STANDARD_INPUT;
 use crate::files::interrupt::{self, Asked};
@@ -215,7 +214,7 @@ impl<const N: usize> OnBoard for Streamed<'_, N> {
         let lines = source.text.iter().filter(|&&byte| byte == b'\n').count() as u64;
         let planned = InPlanning::begin::<R, N>(source, machine);
         let driven = Driven {
-            job: &job,
+            job: Arc::new(job),
             planned: Some(planned),
             found: found(arguments),
             stops: Stops::default(),
@@ -319,13 +318,13 @@ fn send_job<R: Root, const N: usize, const M: usize>(
     let journal = Journal::open(arguments, &subject)?;
     let stops = stops.skip(job.begin.stops);
     let lines = program.steps.last().map_or(0, |step| u64::from(step.line));
-    let driven = Driven { job: &job, planned: None, found, stops, middle, journal, lines };
+    let driven = Driven { job: Arc::new(job), planned: None, found, stops, middle, journal, lines };
     drive(arguments, driven, machine, connection, out)
 }
 
 /// What is driven, and what goes with it.
-struct Driven<'a, const M: usize> {
-    job: &'a Job<M>,
+struct Driven<const M: usize> {
+    job: Arc<Job<M>>,
     /// Its items, where they are planned meanwhile.
     planned: Option<InPlanning<M>>,
     found: Found,
@@ -391,7 +390,7 @@ fn keys(arguments: &SendArguments) -> Receiver<Typed> {
 
 fn drive<const N: usize, const M: usize>(
     arguments: &SendArguments,
-    driven: Driven<'_, M>,
+    driven: Driven<M>,
     machine: &Machine<N>,
     mut connection: Connection<M>,
     out: &mut dyn Write,
@@ -413,7 +412,7 @@ fn drive<const N: usize, const M: usize>(
 
 fn drive_to_end<const N: usize, const M: usize>(
     arguments: &SendArguments,
-    driven: Driven<'_, M>,
+    driven: Driven<M>,
     machine: &Machine<N>,
     connection: &mut Connection<M>,
     out: &mut dyn Write,
@@ -422,24 +421,24 @@ fn drive_to_end<const N: usize, const M: usize>(
         BoardError::Program(error) => CliError::Program(error),
         error => arguments.port.refused(error),
     };
-    let names: Vec<String> = machine.driven_axes().iter().map(|axis| axis.name.clone()).collect();
+    let names: Arc<[String]> = machine.driven_axes().iter().map(|axis| axis.name.clone()).collect();
     let Driven { job, planned, found, stops, middle, mut journal, lines } = driven;
     let may = arguments.drives.permissions(found);
     let items = planned.is_none().then_some(job.items.len());
     let mut sender = match planned {
-        Some(planned) => Sender::planned(job, planned, &names, may),
-        None => Sender::new(job, &names, may),
+        Some(planned) => Sender::planned(Arc::clone(&job), planned, Arc::clone(&names), may),
+        None => Sender::new(Arc::clone(&job), Arc::clone(&names), may),
     };
     let mut progress = Progress::new(job.begin.path, job.header.tick_s);
     if let Some(identity) = connection.identity() {
-        check(job, identity).map_err(refused)?;
+        check(&job, identity).map_err(refused)?;
         let program = arguments.program.display().to_string();
-        check_outputs(&program, job, identity.outputs).map_err(refused)?;
+        check_outputs(&program, &job, identity.outputs).map_err(refused)?;
     }
     let keys = keys(arguments);
     let mut shown = Shown::new(arguments, &names, stops, (items, lines));
     if let Some(middle) = &middle
-        && let Some(outcome) = middle.confirm(job, (connection, &arguments.port), &keys, &shown, out)?
+        && let Some(outcome) = middle.confirm(&job, (connection, &arguments.port), &keys, &shown, out)?
     {
         return Ok(outcome);
     }
@@ -539,7 +538,7 @@ fn drive_to_end<const N: usize, const M: usize>(
 fn note<const M: usize>(
     journal: &mut Journal,
     progress: &mut Progress,
-    sender: &Sender<'_, M>,
+    sender: &Sender<M>,
     connection: &Connection<M>,
     axes: usize,
 ) {
@@ -553,7 +552,7 @@ fn note<const M: usize>(
 }
 
 /// Obeys a key; false if nothing comes of it.
-fn command<const M: usize>(key: char, connection: &mut Connection<M>, sender: &mut Sender<'_, M>) -> bool {
+fn command<const M: usize>(key: char, connection: &mut Connection<M>, sender: &mut Sender<M>) -> bool {
     let change = |permille: u16, by: i16| permille.saturating_add_signed(by).clamp(100, 2000);
     match key {
         'h' => {

@@ -8,7 +8,8 @@ use motion_kernel::link::{State, Status};
 use motion_kernel::units::Position;
 
 use super::SendArguments;
-use super::stops::Stops;
+use crate::board::interface::state_words;
+use crate::board::stops::Stops;
 use crate::board::{Connection, Step};
 use crate::cli::error::CliError;
 
@@ -158,19 +159,5 @@ fn step_words(step: Step) -> &'static str {
         Step::Aborts => "aborting",
         Step::Done => "done",
         Step::Aborted => "aborted",
-    }
-}
-
-/// The word for a state.
-pub(in crate::cli) fn state_words(state: State) -> &'static str {
-    match state {
-        State::Off => "drives off",
-        State::Idle => "idle",
-        State::Moving => "moving",
-        State::Dwell => "dwell",
-        State::Stopped => "program stop",
-        State::Starved => "waiting for items",
-        State::Held => "held",
-        State::Refused => "refused",
     }
 }

@@ -62,6 +62,17 @@ const REPORT: [Module; 2] = [
     ("page/main.js", include_str!("../../../page/main.js")),
 ];
 
+/// What the panel has.
+const PANEL: [Module; 5] = [
+    ("page/panel/link.js", include_str!("../../../page/panel/link.js")),
+    ("page/panel/follow.js", include_str!("../../../page/panel/follow.js")),
+    ("page/panel/display.js", include_str!("../../../page/panel/display.js")),
+    ("page/panel/controls.js", include_str!("../../../page/panel/controls.js")),
+    ("page/panel/main.js", include_str!("../../../page/panel/main.js")),
+];
+const PANEL_STYLE: &str = include_str!("../../../page/panel/panel.css");
+const PANEL_CONTROLS: &str = include_str!("../../../page/panel/panel.html");
+
 /// Size of a page: at least, at most, and for each second of the run \[bytes\].
 const PAGE_LEAST: f64 = 2.7e6;
 const PAGE_MOST: f64 = 11.7e6;
@@ -99,6 +110,12 @@ impl PageRun {
         &self.data
     }
 
+    /// The same of the program, where there is one.
+    #[must_use]
+    pub fn program(&self) -> Option<&[u8]> {
+        self.program.as_deref()
+    }
+
     pub(super) fn with_summary<const N: usize>(trace: &RunTrace<N>, summary: &Summary) -> io::Result<Self> {
         let program = trace.source.as_ref().map(|source| {
             let program = ProgramJson { text: &source.text, times: source.times.clone() };
@@ -124,7 +141,7 @@ pub(super) fn write<const N: usize>(
 ) -> io::Result<()> {
     let run = PageRun::with_summary(trace, summary)?;
     let title = format!("{} – motion report", file_name(program_name(trace)));
-    let page = Page { title: &title, modules: &REPORT, style: "", tools: "", headline };
+    let page = Page { title: &title, modules: &REPORT, tools: "", headline };
     page.write(out, |out| {
         for (role, run) in [("", Some(&run)), ("against-", against)] {
             let Some(run) = run else { continue };
@@ -137,13 +154,20 @@ pub(super) fn write<const N: usize>(
     })
 }
 
+/// The panel's page, without data: it asks its server for them.
+pub(super) fn panel() -> String {
+    let tools = format!("<style>\n{PANEL_STYLE}</style>\n{PANEL_CONTROLS}");
+    let page = Page { title: "motion panel", modules: &PANEL, tools: &tools, headline: "" };
+    let mut written = Vec::new();
+    page.write(&mut written, |_| Ok(())).expect("memory takes all");
+    String::from_utf8(written).expect("all of it is text")
+}
+
 /// What differs from page to page.
 struct Page<'a> {
     title: &'a str,
     /// Besides [`MODULES`]; the last one starts the page.
     modules: &'a [Module],
-    /// Behind the style of all pages.
-    style: &'a str,
     /// HTML above the headline.
     tools: &'a str,
     /// HTML.
@@ -160,7 +184,7 @@ impl Page<'_> {
             out.write_all(before.as_bytes())?;
             match name {
                 "title" => out.write_all(escape(self.title).as_bytes())?,
-                "style" => write!(out, "{STYLE}{}{}", self.style, palette::variables())?,
+                "style" => write!(out, "{STYLE}{}", palette::variables())?,
                 "modules" => out.write_all(import_map(self.modules).as_bytes())?,
                 "tools" => out.write_all(self.tools.as_bytes())?,
                 "headline" => out.write_all(self.headline.as_bytes())?,

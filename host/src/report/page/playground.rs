@@ -45,7 +45,8 @@ impl Playground<'_> {
         let sheets = data::compressed(&[&serde_json::to_vec(self)?])?;
         let module = data::compressed_to(Compression::best(), &[module])?;
         let title = "motion playground";
-        let page = Page { title, modules: &PLAYGROUND, style: STYLE, tools: TOOLS, headline: "" };
+        let tools = format!("<style>\n{STYLE}</style>\n{TOOLS}");
+        let page = Page { title, modules: &PLAYGROUND, tools: &tools, headline: "" };
         page.write(out, |out| {
             embed("sheets", &sheets, out)?;
             embed("module", &module, out)

@@ -2,6 +2,8 @@
 //!
 //! Filled by the simulation, read by the summary, the trace file and the report.
 
+pub mod columns;
+
 use std::borrow::Cow;
 
 use motion_kernel::hal::OutputState;

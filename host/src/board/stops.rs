@@ -3,13 +3,13 @@
 use motion_kernel::program::Item;
 use motion_kernel::units::Position;
 
-use crate::board::Job;
+use super::job::Job;
 use crate::gcode::{Program, StepKind};
 use crate::planning::{Item as PlanItem, Plan};
 
 /// Places of program stops, in their order, with what the program says of them.
 #[derive(Default)]
-pub(super) struct Stops {
+pub struct Stops {
     places: Vec<(Vec<Position>, String)>,
     /// Those before were reached.
     next: usize,
@@ -17,11 +17,8 @@ pub(super) struct Stops {
 
 impl Stops {
     /// The stops of a program.
-    pub(super) fn new<const N: usize, const M: usize>(
-        program: &Program,
-        plan: &Plan<N>,
-        job: &Job<M>,
-    ) -> Self {
+    #[must_use]
+    pub fn new<const N: usize, const M: usize>(program: &Program, plan: &Plan<N>, job: &Job<M>) -> Self {
         let lines = plan.items.iter().filter_map(|item| match item {
             PlanItem::Stop { line } => Some(*line),
             _ => None,
@@ -42,17 +39,23 @@ impl Stops {
     }
 
     /// Without the first ones.
-    pub(super) fn skip(self, count: usize) -> Self {
+    #[must_use]
+    pub fn skip(self, count: usize) -> Self {
         Self { next: count, ..self }
     }
 
+    /// From the first one on, again.
+    pub fn rewind(&mut self) {
+        self.next = 0;
+    }
+
     /// The next stop is known.
-    pub(super) fn add(&mut self, place: Vec<Position>, text: String) {
+    pub fn add(&mut self, place: Vec<Position>, text: String) {
         self.places.push((place, text));
     }
 
     /// What is said of the stop at `set`, the next one there.
-    pub(super) fn at(&mut self, set: &[Position]) -> Option<&str> {
+    pub fn at(&mut self, set: &[Position]) -> Option<&str> {
         let is_here = |(place, _): &(Vec<Position>, String)| place.starts_with(set);
         let (index, (_, text)) =
             self.places.iter().enumerate().skip(self.next).find(|(_, place)| is_here(place))?;
