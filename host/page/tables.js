@@ -5,7 +5,7 @@ import { figure, fixed } from "page/format.js";
 const BLOCKS_PER_PAGE = 20;
 
 /** An element with attributes and children. */
-function make(name, attributes = {}, ...children) {
+export function make(name, attributes = {}, ...children) {
   const element = document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
   element.append(...children);
@@ -14,7 +14,7 @@ function make(name, attributes = {}, ...children) {
 
 /** A table that scrolls by itself where the page is too narrow. Headings of words begin with a star; a name that is not ours
  * is a heading as it is, in a list of its own. */
-function table(name, headings, rows) {
+export function table(name, headings, rows) {
   const head = headings.map((heading) => {
     if (Array.isArray(heading)) return make("th", { scope: "col" }, heading[0]);
     const isWord = heading.startsWith("*");
@@ -27,7 +27,7 @@ function table(name, headings, rows) {
     make("table", {}, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...rows)));
 }
 
-const cell = (text, isWord) => make("td", isWord ? { class: "word" } : {}, text);
+export const cell = (text, isWord) => make("td", isWord ? { class: "word" } : {}, text);
 
 export class Tables {
   /** `kept` is what the reader chose of the tables that were shown before, if there were any. */

@@ -24,11 +24,20 @@
 //!   identify   recordings ─► drive parameters     what an axis is, from its runs
 //!   tuning     drive parameters ─► gains          with the reason for each
 //!   report     RunTrace ─► HTML                  one file, its data inside
+//!   ramp       limits, feeds ─► figures         one change of feed
+//!   playground request ─► steps ─► answer       what a page in a browser asks for
 //!   cli        the `motion` command
 //! ```
+//!
+//! Without the feature `terminal` it is what a page runs: no files, no threads, no wires, no command.
 
+// What only the command uses is in modules that others use, too.
+#![cfg_attr(not(feature = "terminal"), allow(dead_code, unused_imports))]
+
+#[cfg(feature = "terminal")]
 pub mod files;
 pub mod machine;
+#[cfg(feature = "terminal")]
 pub mod cli;
 pub mod touch;
 pub mod gcode;
@@ -41,7 +50,9 @@ pub mod compare;
 pub mod simulate;
 pub mod recording;
 pub mod flight;
+#[cfg(feature = "terminal")]
 pub mod board;
+#[cfg(feature = "terminal")]
 pub mod panel;
 pub mod axis_unit;
 pub mod trace;
@@ -49,4 +60,6 @@ pub mod drive;
 pub mod identify;
 pub mod tuning;
 pub mod report;
+pub mod ramp;
+pub mod playground;
 pub mod sine;

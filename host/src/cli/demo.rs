@@ -13,7 +13,7 @@ use crate::simulate::RunOptions;
 
 /// The program: line, arc R4, arc R10, arc R4, line, tangent to each other.
 pub const STRINGER: &str = include_str!("stringer.ngc");
-const STRINGER_NAME: &str = "stringer.ngc";
+pub(super) const STRINGER_NAME: &str = "stringer.ngc";
 /// The report's name, in the current directory.
 const REPORT: &str = "stringer.html";
 

@@ -75,6 +75,16 @@ pub enum CliError {
         /// The system's reason.
         source: io::Error,
     },
+    /// There is no module for a page.
+    #[error(
+        "{path}: found {found}, expected the module of the page; host/wasm/build of the repository builds it"
+    )]
+    NoModule {
+        /// Where it was looked for.
+        path: String,
+        /// What is there.
+        found: String,
+    },
     /// A program can't be begun at a line.
     #[error("{program}:{line}: {source}")]
     FromLine {

@@ -14,7 +14,7 @@ use super::error::{CliError, Outcome};
 /// The commands, by what one wants to do.
 const GROUPS: [(&str, &[&str]); 6] = [
     ("Look at a program", &["read", "check", "plan", "compare"]),
-    ("Run it on simulated axes", &["run", "replay"]),
+    ("Run it on simulated axes", &["run", "replay", "page"]),
     (
         "Drive a machine through a board",
         &["send", "resume", "panel", "watch", "parameters", "compile", "flight", "board"],

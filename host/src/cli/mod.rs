@@ -26,6 +26,7 @@
 //! - [`compare`]: the times of programs, exact and blended, compared with the least possible;
 //! - [`run`]: a program through plan, kernel and simulated machine;
 //! - [`replay`]: runs a recording again;
+//! - [`page`]: a page that plans and runs programs in a browser;
 //! - [`flight`]: the ticks around a fault, from a board's log;
 //! - [`spline`]: points to a spline and its run, or the experiment on path smoothness;
 //! - [`drive`]: experiments with the drives: step, harmonic motion, circles;
@@ -57,6 +58,7 @@ pub mod help;
 pub mod home;
 pub mod jog;
 pub mod machine;
+pub mod page;
 pub mod panel;
 pub mod parameters;
 pub mod plan;
@@ -96,6 +98,7 @@ Examples:
   motion run part.ngc --report part.html         run a program, with a report on the axes
   motion replay part.mrec                        run a recording again, to the same bits
   motion read part.ngc                           the steps of a program, with absolute end points
+  motion page                                    a page that plans and runs programs in a browser
   motion check part.ngc                          all refusals at once; time, needs and advice
   motion plan part.ngc                           what limits the feed, block by block
   motion compare parts/                          how long programs take, exact and blended
@@ -148,6 +151,7 @@ enum Command {
     Plan(plan::PlanArguments),
     Compare(compare::CompareArguments),
     Profile(profile::ProfileArguments),
+    Page(page::PageArguments),
     Spline(spline::SplineArguments),
     Drive(drive::DriveArguments),
     Compile(compile::CompileArguments),
@@ -204,6 +208,7 @@ fn execute(cli: &Cli, out: &mut dyn Write) -> Result<Outcome, CliError> {
         Some(Command::Plan(arguments)) => plan::plan(arguments, out),
         Some(Command::Compare(arguments)) => compare::compare(arguments, out),
         Some(Command::Profile(arguments)) => profile::profile(arguments, out),
+        Some(Command::Page(arguments)) => page::page(arguments, out),
         Some(Command::Spline(arguments)) => spline::run(arguments, out),
         Some(Command::Drive(arguments)) => drive::drive(arguments, out),
         Some(Command::Compile(arguments)) => compile::compile(arguments, out),

@@ -3,12 +3,12 @@
 use std::io::{self, Write};
 
 use clap::{Args, ValueEnum};
-use motion_kernel::law::{FeedState, Law, Limits, Pulse, Ramp};
-use serde::Serialize;
+use motion_kernel::law::{Limits, Pulse, Ramp};
 
 use super::error::{CliError, Outcome};
 use super::table::{self, Align};
 use super::{csv_failure, write_json};
+use crate::ramp::{self, Moment, RampError, RampFigures, corner_times_s};
 
 /// More rows than this mean a mistyped tick.
 const ROWS_MAX: f64 = 1e8;
@@ -95,38 +95,6 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-#[derive(Serialize)]
-struct ProfileJson {
-    law: &'static str,
-    peak_jerk_mm_s3: f64,
-    edge_s: f64,
-    plateau_s: f64,
-    t1_s: f64,
-    t2_s: f64,
-    tp_s: f64,
-    length_mm: f64,
-    limited_by: &'static str,
-    at: [Row; 4],
-}
-
-/// The motion at one time: an item of `at`, a row of the CSV.
-#[derive(Clone, Copy, Serialize)]
-struct Row {
-    t_s: f64,
-    s_mm: f64,
-    v_mm_s: f64,
-    a_mm_s2: f64,
-    j_mm_s3: f64,
-    snap_mm_s4: f64,
-}
-
-impl Row {
-    fn new(ramp: &Ramp<f64>, t_s: f64) -> Self {
-        let FeedState { s_mm, v_mm_s, a_mm_s2, j_mm_s3, snap_mm_s4 } = ramp.at(t_s);
-        Self { t_s, s_mm, v_mm_s, a_mm_s2, j_mm_s3, snap_mm_s4 }
-    }
-}
-
 /// Computes and prints the ramp.
 ///
 /// # Errors
@@ -136,7 +104,7 @@ pub fn profile(arguments: &ProfileArguments, out: &mut dyn Write) -> Result<Outc
     if arguments.csv {
         write_csv(&ramp, arguments.tick, out)?;
     } else if arguments.json {
-        write_json(&json(arguments.law.into(), &ramp), out)?;
+        write_json(&RampFigures::new(arguments.law.into(), &ramp), out)?;
     } else {
         write_table(&ramp, out).map_err(CliError::Output)?;
     }
@@ -144,38 +112,10 @@ pub fn profile(arguments: &ProfileArguments, out: &mut dyn Write) -> Result<Outc
 }
 
 fn ramp(arguments: &ProfileArguments) -> Result<Ramp<f64>, CliError> {
-    let beyond =
-        |found: String| CliError::Arguments { found, expected: "limits nearer to those of a machine" };
     let limits =
         Limits { accel_mm_s2: arguments.accel, jerk_mm_s3: arguments.jerk, snap_mm_s4: arguments.snap };
-    let law = Law::new(arguments.law.into(), limits).map_err(|error| beyond(error.to_string()))?;
-    let ramp = Ramp::new(&law, arguments.from, arguments.to);
-    let figures = [ramp.peak_jerk_mm_s3, ramp.t1_s, ramp.t2_s, ramp.duration_s(), ramp.length_mm()];
-    if figures.iter().all(|figure| figure.is_finite()) {
-        Ok(ramp)
-    } else {
-        Err(beyond("a ramp whose figures exceed the range of numbers".to_owned()))
-    }
-}
-
-fn json(law: Pulse, ramp: &Ramp<f64>) -> ProfileJson {
-    ProfileJson {
-        law: law.name(),
-        peak_jerk_mm_s3: ramp.peak_jerk_mm_s3,
-        edge_s: ramp.edge_s,
-        plateau_s: ramp.plateau_s(),
-        t1_s: ramp.t1_s,
-        t2_s: ramp.t2_s,
-        tp_s: ramp.duration_s(),
-        length_mm: ramp.length_mm(),
-        limited_by: ramp.limited_by.name(),
-        at: corner_times_s(ramp).map(|t_s| Row::new(ramp, t_s)),
-    }
-}
-
-/// e/2, t1, t2, tp: where the papers, in which e/2 is t1/4, give their figures.
-fn corner_times_s(ramp: &Ramp<f64>) -> [f64; 4] {
-    [ramp.edge_s / 2.0, ramp.t1_s, ramp.t2_s, ramp.duration_s()]
+    ramp::ramp(arguments.law.into(), limits, [arguments.from, arguments.to])
+        .map_err(|RampError { found }| CliError::Arguments { found, expected: RampError::EXPECTED })
 }
 
 fn write_csv(ramp: &Ramp<f64>, tick_s: f64, out: &mut dyn Write) -> Result<(), CliError> {
@@ -189,7 +129,7 @@ fn write_csv(ramp: &Ramp<f64>, tick_s: f64, out: &mut dyn Write) -> Result<(), C
     let mut csv = csv::Writer::from_writer(out);
     let times_s = (0..before_end).map(|tick| tick as f64 * tick_s).chain([end_s]);
     for t_s in times_s {
-        csv.serialize(Row::new(ramp, t_s)).map_err(|error| CliError::Output(csv_failure(error)))?;
+        csv.serialize(Moment::new(ramp, t_s)).map_err(|error| CliError::Output(csv_failure(error)))?;
     }
     csv.flush().map_err(CliError::Output)
 }
@@ -225,7 +165,7 @@ fn write_table(ramp: &Ramp<f64>, out: &mut dyn Write) -> io::Result<()> {
     let names = [middle_of_the_edge, "t1", "t2", "tp"];
     let rows: Vec<[String; 7]> = names
         .iter()
-        .zip(corner_times_s(ramp).map(|t_s| Row::new(ramp, t_s)))
+        .zip(corner_times_s(ramp).map(|t_s| Moment::new(ramp, t_s)))
         .map(|(name, row)| {
             [
                 (*name).to_owned(),
@@ -245,11 +185,11 @@ fn write_table(ramp: &Ramp<f64>, out: &mut dyn Write) -> io::Result<()> {
 mod tests {
     use super::*;
 
-    fn of(from: f64, to: f64) -> ProfileJson {
+    fn of(from: f64, to: f64) -> RampFigures {
         under(LawChoice::Sin2, from, to)
     }
 
-    fn under(law: LawChoice, from: f64, to: f64) -> ProfileJson {
+    fn under(law: LawChoice, from: f64, to: f64) -> RampFigures {
         let arguments = ProfileArguments {
             from,
             to,
@@ -261,7 +201,7 @@ mod tests {
             json: false,
             csv: false,
         };
-        json(law.into(), &ramp(&arguments).expect("a ramp"))
+        RampFigures::new(law.into(), &ramp(&arguments).expect("a ramp"))
     }
 
     /// The three worked examples of S1, in mm, to half of the last digit the paper prints. The third prints
@@ -393,7 +333,7 @@ mod tests {
         for law in [LawChoice::Sin2, LawChoice::Plateau] {
             let none = under(law, 100.0, 100.0);
             assert!(none.tp_s <= 0.0 && none.length_mm <= 0.0 && none.peak_jerk_mm_s3 <= 0.0);
-            let is_at_rest = |row: &Row| (row.v_mm_s - 100.0).abs() < 1e-12 && row.snap_mm_s4.abs() <= 0.0;
+            let is_at_rest = |row: &Moment| (row.v_mm_s - 100.0).abs() < 1e-12 && row.snap_mm_s4.abs() <= 0.0;
             assert!(none.at.iter().all(is_at_rest));
         }
     }
@@ -402,8 +342,7 @@ mod tests {
     fn the_csv_ends_at_the_end() {
         for (tick_s, rows) in [(0.001, 601), (0.0007, 859), (1.0, 2), (0.6, 2)] {
             let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
-            let law = Law::new(Pulse::Sin2, limits).expect("law");
-            let ramp = Ramp::new(&law, 0.0, 200.0);
+            let ramp = ramp::ramp(Pulse::Sin2, limits, [0.0, 200.0]).expect("a ramp");
             let mut text = Vec::new();
             write_csv(&ramp, tick_s, &mut text).expect("memory");
             let text = String::from_utf8(text).expect("UTF-8");

@@ -25,6 +25,10 @@ pub fn identify_axes(machine: &Machine, axes: &[usize]) -> Result<Vec<Identifica
         let name = machine.axes.get(axis).map_or_else(String::new, |axis| axis.name.clone());
         identify(&runs).map_err(|source| DriveError::Identification { axis: name, source })
     };
+    if thread::available_parallelism().map_or(1, usize::from) < 2 {
+        // A page has no threads.
+        return axes.iter().map(|&axis| one(axis)).collect();
+    }
     thread::scope(|scope| {
         let workers: Vec<_> = axes.iter().map(|&axis| scope.spawn(move || one(axis))).collect();
         let join = |worker: thread::ScopedJoinHandle<'_, _>| {

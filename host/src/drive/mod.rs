@@ -17,6 +17,7 @@
 //! - [`circle`](mod@circle): contour error, form deviation, following error;
 //! - [`compare`]: regulators side by side; [`peer_regulator`]: one that differences positions;
 //!   [`replay`](mod@replay): recorded set values under another regulator;
+//! - [`verification`]: circles before and after tuning;
 //! - [`learning`]: a correction of a path that is driven repeatedly;
 //! - [`bode`]: the step's spectrum, harmonics and the linear model side by side;
 //! - [`spectrum`], [`model`]: the mathematics of it; [`inverse`](mod@inverse): the kernel's inverse of a
@@ -40,6 +41,7 @@ pub mod replay;
 pub mod spectrum;
 pub mod step;
 pub mod circle_motion;
+pub mod verification;
 
 pub use experiment::{DriveError, Recording, Terms};
 

@@ -1,6 +1,7 @@
 //! Values written into a machine file, whose comments and layout stay as they are.
 
 use motion_kernel::axis::{Feedforward, Gains};
+use serde::Deserialize;
 use toml_edit::{DocumentMut, Item, Table, value};
 
 use super::error::MachineError;
@@ -23,16 +24,12 @@ pub struct AxisEdit {
 /// # Errors
 /// The text is no machine file: not TOML, or without the tables that the values belong to.
 pub fn edited(source_name: &str, text: &str, edits: &[AxisEdit]) -> Result<String, MachineError> {
-    let refused =
-        |at: std::ops::Range<usize>, problem: String| MachineError::new(source_name, text, &at, problem);
-    let mut document: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| {
-        refused(error.span().unwrap_or(0..0), format!("found {}", error.message().replace('\n', ", ")))
-    })?;
+    let mut document = document(source_name, text)?;
     for edit in edits {
         let missing = |table: &str| {
             let place =
                 format!("found no table [axis.{table}] of axis {}, expected [[axis]] with it", edit.axis + 1);
-            refused(0..0, place)
+            MachineError::new(source_name, text, &(0..0), place)
         };
         let axes = document.get_mut("axis").and_then(Item::as_array_of_tables_mut);
         let axis = axes.and_then(|axes| axes.get_mut(edit.axis)).ok_or_else(|| missing("regulator"))?;
@@ -43,6 +40,70 @@ pub fn edited(source_name: &str, text: &str, edits: &[AxisEdit]) -> Result<Strin
         set_regulator(regulator, edit);
     }
     Ok(document.to_string())
+}
+
+fn document(source_name: &str, text: &str) -> Result<DocumentMut, MachineError> {
+    text.parse().map_err(|error: toml_edit::TomlError| {
+        let problem = format!("found {}", error.message().replace('\n', ", "));
+        MachineError::new(source_name, text, &error.span().unwrap_or(0..0), problem)
+    })
+}
+
+/// A number of a machine file.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct NumberEdit {
+    /// The name of its table in dots, as in [`KEY_TABLES`](super::keys::KEY_TABLES).
+    pub table: String,
+    /// Its key.
+    pub key: String,
+    /// Of a table of axes: which axis, from 0; all of them without.
+    #[serde(default)]
+    pub axis: Option<usize>,
+    /// Its new value.
+    pub value: f64,
+}
+
+/// `text`, a machine file, with other numbers. Whether they are in their ranges is found when it is read.
+///
+/// # Errors
+/// The text is not TOML, or has no such table.
+pub fn with_numbers(source_name: &str, text: &str, edits: &[NumberEdit]) -> Result<String, MachineError> {
+    let mut document = document(source_name, text)?;
+    for NumberEdit { table, key, axis, value } in edits {
+        let mut tables = tables_of(&mut document, table);
+        if let Some(axis) = axis {
+            tables = tables.into_iter().skip(*axis).take(1).collect();
+        }
+        if tables.is_empty() {
+            let problem = format!("found no table [{table}], expected it for {key}");
+            return Err(MachineError::new(source_name, text, &(0..0), problem));
+        }
+        tables.into_iter().for_each(|table| set(table, key, Some(*value)));
+    }
+    Ok(document.to_string())
+}
+
+/// A key's numbers in a machine file, one of each table of this name that has it.
+#[must_use]
+pub fn numbers(text: &str, table: &str, key: &str) -> Vec<Option<f64>> {
+    let Ok(mut document) = text.parse::<DocumentMut>() else { return Vec::new() };
+    let number = |table: &mut Table| {
+        let value = table.get(key)?;
+        value.as_float().or_else(|| value.as_integer().map(|integer| integer as f64))
+    };
+    tables_of(&mut document, table).into_iter().map(number).collect()
+}
+
+/// The tables of a name in dots; of a list all that have it.
+fn tables_of<'a>(document: &'a mut DocumentMut, name: &str) -> Vec<&'a mut Table> {
+    name.split('.').fold(vec![document.as_table_mut()], |tables, part| {
+        let of_table = |table: &'a mut Table| match table.get_mut(part) {
+            Some(Item::Table(table)) => vec![table],
+            Some(Item::ArrayOfTables(list)) => list.iter_mut().collect(),
+            _ => Vec::new(),
+        };
+        tables.into_iter().flat_map(of_table).collect()
+    })
 }
 
 fn set_regulator(regulator: &mut Table, edit: &AxisEdit) {
@@ -177,6 +238,40 @@ mod tests {
         machine.axes[0].feedforward.tables = tables;
         let with = edited("m.toml", &text, &[edit(&machine, 0)]).expect("a machine file");
         assert_eq!(read(&with), machine);
+    }
+
+    #[test]
+    fn numbers_are_of_one_axis_or_of_all() {
+        let of = |table: &str, key: &str, axis, value| NumberEdit {
+            table: table.to_owned(),
+            key: key.to_owned(),
+            axis,
+            value,
+        };
+        let edits = [
+            of("path", "accel_mm_s2", None, 750.0),
+            of("axis", "jerk_mm_s3", None, 4000.5),
+            of("axis.regulator", "kp_per_s", Some(1), 200.0),
+            of("path", "blend_tolerance_mm", None, 0.05),
+        ];
+        let text = with_numbers("m.toml", REFERENCE_TOML, &edits).expect("a machine file");
+        let mut expected = Machine::reference();
+        expected.path.accel_mm_s2 = 750.0;
+        expected.path.blend_tolerance_mm = 0.05;
+        expected.axes.iter_mut().for_each(|axis| axis.jerk_mm_s3 = 4000.5);
+        expected.axes[1].gains.kp_per_s = 200.0;
+        assert_eq!(Machine::from_toml("m.toml", &text), Ok(expected));
+        assert_eq!(numbers(&text, "axis.regulator", "kp_per_s"), [230.0, 200.0, 230.0].map(Some));
+        assert_eq!(numbers(&text, "path", "jerk_mm_s3"), [Some(5000.0)]);
+        // One axis has a bed.
+        assert_eq!(numbers(&text, "axis.drive.bed", "frequency_hz"), [Some(13.4)]);
+        assert_eq!(numbers(&text, "axis", "nothing"), [None; 3]);
+        let refused =
+            |edit| with_numbers("m.toml", REFERENCE_TOML, &[edit]).expect_err("refused").to_string();
+        assert_eq!(
+            refused(of("axis.drive", "dead_time_s", Some(3), 0.0)),
+            "m.toml:1:1: found no table [axis.drive], expected it for dead_time_s"
+        );
     }
 
     #[test]

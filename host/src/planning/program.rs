@@ -2,7 +2,7 @@
 
 use motion_kernel::law::PlannedRamp;
 
-use super::error::{AtLine, PlanningError};
+use super::error::{AtLine, PlanningError, Problem};
 use super::executable::Executable;
 use super::outputs::acts_on;
 use super::pipeline::{Next, Pipeline};
@@ -25,16 +25,59 @@ pub fn plan_program<const N: usize>(
     mode: Mode,
 ) -> Result<Plan<N>, PlanningError> {
     let machine = &driven(machine, mode);
-    let mut plan = Plan::empty(source_name, machine.path.pulse, machine.tick_s, machine.letters_by_place());
-    plan.notices = notes(program, machine);
-    plan.notices.extend(assumed_path(&program.steps, machine));
-    let (mut pipeline, mut gathered) = (Pipeline::new(machine, mode), Gathered::new(plan));
-    let mut out = |next| gathered.take(next);
-    pipeline
-        .take((&program.steps, &program.nurbs, &[]), &mut out)
-        .and_then(|()| pipeline.end(&mut out))
-        .map_err(|problem| PlanningError::at_line(source_name, problem))?;
-    gathered.checked(machine)
+    let mut planner = Planner::with_mode(source_name, program, machine, mode);
+    planner.take(&program.steps)?;
+    planner.finish()
+}
+
+/// A program on its way to its plan.
+pub struct Planner<'m, const N: usize> {
+    program: &'m Program,
+    machine: &'m Machine<N>,
+    pipeline: Pipeline<'m, N>,
+    gathered: Gathered<N>,
+}
+
+impl<'m, const N: usize> Planner<'m, N> {
+    /// Before the first step. Ramps may span blocks.
+    #[must_use]
+    pub fn new(source_name: &str, program: &'m Program, machine: &'m Machine<N>) -> Self {
+        Self::with_mode(source_name, program, machine, Mode::Spanning)
+    }
+
+    /// `machine` has the pulses of jerk of `mode`.
+    fn with_mode(source_name: &str, program: &'m Program, machine: &'m Machine<N>, mode: Mode) -> Self {
+        let mut plan =
+            Plan::empty(source_name, machine.path.pulse, machine.tick_s, machine.letters_by_place());
+        plan.notices = notes(program, machine);
+        plan.notices.extend(assumed_path(&program.steps, machine));
+        Self { program, machine, pipeline: Pipeline::new(machine, mode), gathered: Gathered::new(plan) }
+    }
+
+    /// Takes the next of the program's steps.
+    ///
+    /// # Errors
+    /// As [`plan_program`].
+    pub fn take(&mut self, steps: &[Step]) -> Result<(), PlanningError> {
+        let gathered = &mut self.gathered;
+        let taken = self.pipeline.take((steps, &self.program.nurbs, &[]), &mut |next| gathered.take(next));
+        taken.map_err(|problem| self.refused(problem))
+    }
+
+    /// The plan of what was taken, to rest.
+    ///
+    /// # Errors
+    /// As [`plan_program`].
+    pub fn finish(mut self) -> Result<Plan<N>, PlanningError> {
+        let gathered = &mut self.gathered;
+        let ended = self.pipeline.end(&mut |next| gathered.take(next));
+        ended.map_err(|problem| self.refused(problem))?;
+        self.gathered.checked(self.machine)
+    }
+
+    fn refused(&self, problem: (u32, Problem)) -> PlanningError {
+        PlanningError::at_line(&self.gathered.plan.source, problem)
+    }
 }
 
 /// Plans moves that follow each other, from rest to rest.

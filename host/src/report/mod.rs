@@ -8,12 +8,18 @@
 //!
 //! Reports of experiments ([`drive`], [`smoothness`]) are pictures between words.
 
+#[cfg(feature = "terminal")]
 mod decimate;
+#[cfg(feature = "terminal")]
 pub mod drive;
 mod format;
 pub mod page;
+#[cfg(test)]
+pub(crate) use page::reading;
 mod palette;
+#[cfg(feature = "terminal")]
 mod plots;
+#[cfg(feature = "terminal")]
 pub mod smoothness;
 mod summary;
 mod tables;
@@ -47,6 +53,15 @@ pub fn write_html<const N: usize>(
 ) -> io::Result<()> {
     let summary = Summary::of(trace);
     page::write(trace, &summary, &headline(trace, &summary), against, out)
+}
+
+/// What a page shows of a run: what it came to in words and tables, as HTML, and its data.
+///
+/// # Errors
+/// Writing into memory fails.
+pub fn page_parts<const N: usize>(trace: &RunTrace<N>) -> io::Result<(String, PageRun)> {
+    let summary = Summary::of(trace);
+    Ok((headline(trace, &summary), PageRun::with_summary(trace, &summary)?))
 }
 
 /// The page of an operator's panel, which has its data from its server.

@@ -5,6 +5,7 @@
 //! 3:1 to the paper, text of at least 4.5:1, and where several lines share a plot they also differ in their
 //! dashes.
 
+#[cfg(feature = "terminal")]
 use plotters::style::RGBColor;
 
 /// A colour on light and on dark paper, and the dashes of a line drawn in it (empty: solid).
@@ -25,6 +26,7 @@ const fn dashed(light: u32, dark: u32, dash: &'static str) -> Ink {
 
 impl Ink {
     /// The colour to draw with.
+    #[cfg(feature = "terminal")]
     pub(super) fn rgb(self) -> RGBColor {
         let [_, r, g, b] = self.light.to_be_bytes();
         RGBColor(r, g, b)

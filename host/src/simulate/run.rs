@@ -3,15 +3,18 @@
 //! Consumes a [`Job`] and [`Hardware`]; whatever the hardware is, kernel, streams and background are the
 //! same, and so is what they do, to the bit, as long as the hardware's answers are.
 
-use motion_kernel::axis::Correction;
+use core::convert::Infallible;
+
+use motion_kernel::axis::{AxesConfig, Correction};
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::Reaction;
 use motion_kernel::kernel::{CorrectedIntake, Kernel};
 use motion_kernel::num::{Fixed, Real};
+use motion_kernel::program::Item;
 use motion_kernel::trace::Trace;
 
 use super::Observer;
-use super::background::Storage;
+use super::background::{Background, Storage};
 use super::commands::Commands;
 use super::contour::Contour;
 use super::error::RunError;
@@ -93,126 +96,206 @@ fn run_in<R: Real, const N: usize>(
     hardware: &mut impl Hardware<N>,
     observe: &mut Observer<'_, N>,
 ) -> Result<RunSummary, RunError> {
-    let Job { header, info, correction, script, .. } = job;
-    let tick_s = header.tick_s;
-    let config = job.axes_config()?;
-    let mut kernel = Kernel::<R, N>::new(&config, header.start, hardware.start_counts());
-    kernel.enable(0);
-    let of_axis = |knot: &[f64; 3], axis: usize| R::from_f64(knot.get(axis).copied().unwrap_or_default());
-    let knots_mm_s: Vec<[R; N]> = correction
-        .iter()
-        .flat_map(|correction| &correction.knots_mm_s)
-        .map(|knot| core::array::from_fn(|axis| of_axis(knot, axis)))
-        .collect();
-    let mut storage = Storage::<R, N>::new(script.as_ref(), info);
-    let items = job.items.iter().map(|&item| Ok(item));
-    let (mut background, intake) =
-        storage.split(header.rules, (header.start, job.guards.travel()), items, (header.pulse, tick_s));
-    let mut intake = CorrectedIntake::from(intake);
-    if let &Some(StretchCorrection { stretch, knot_ticks, bound_mm_s, .. }) = correction {
-        intake.correct(Correction::new(stretch, &knots_mm_s, knot_ticks, bound_mm_s)?)?;
+    let mut memory = Memory::<R, N>::new(job);
+    let mut execution = Execution::new(job, &mut memory, hardware)?;
+    while execution.tick(observe)? {}
+    Ok(execution.finish())
+}
+
+/// What a run keeps its streams in, and what was learnt.
+pub struct Memory<'job, R: Real, const N: usize> {
+    storage: Storage<'job, R, N>,
+    knots_mm_s: Vec<[R; N]>,
+}
+
+impl<'job, R: Real, const N: usize> Memory<'job, R, N> {
+    /// For one run of a job.
+    #[must_use]
+    pub fn new(job: &'job Job<N>) -> Self {
+        let of_axis = |knot: &[f64; 3], axis: usize| R::from_f64(knot.get(axis).copied().unwrap_or_default());
+        let knots_mm_s = job
+            .correction
+            .iter()
+            .flat_map(|correction| &correction.knots_mm_s)
+            .map(|knot| core::array::from_fn(|axis| of_axis(knot, axis)))
+            .collect();
+        Self { storage: Storage::new(job.script.as_ref(), &job.info), knots_mm_s }
+    }
+}
+
+/// The items of a job, as the background takes them.
+type Items<'a, const N: usize> =
+    core::iter::Map<core::slice::Iter<'a, Item<N>>, fn(&'a Item<N>) -> Result<Item<N>, Infallible>>;
+
+/// A run on its way, from one tick to the next.
+pub struct Execution<'a, R: Real, H, const N: usize> {
+    job: &'a Job<N>,
+    hardware: &'a mut H,
+    config: AxesConfig<R, N>,
+    kernel: Kernel<R, N>,
+    background: Background<'a, R, Items<'a, N>, N>,
+    intake: CorrectedIntake<'a, R, N>,
+    summary: RunSummary,
+    collector: Collector<N>,
+    contour: Contour<N>,
+    limit_share: LimitShare<'a, N>,
+    probing: Probing<'a>,
+    commands: Commands<'a>,
+    switches: Switches<'a>,
+    stops: u64,
+    stopped_ticks: u64,
+    state: ExecState,
+    s_mm: f64,
+    /// The hardware takes another tick.
+    goes_on: bool,
+}
+
+impl<'a, R: Real, H: Hardware<N>, const N: usize> Execution<'a, R, H, N> {
+    /// Before the first tick of `job` on `hardware`.
+    ///
+    /// # Errors
+    /// The job can't be executed.
+    pub fn new(
+        job: &'a Job<N>,
+        memory: &'a mut Memory<'_, R, N>,
+        hardware: &'a mut H,
+    ) -> Result<Self, RunError> {
+        let Job { header, info, correction, script, .. } = job;
+        let tick_s = header.tick_s;
+        let config = job.axes_config()?;
+        let mut kernel = Kernel::<R, N>::new(&config, header.start, hardware.start_counts());
+        kernel.enable(0);
+        let items: Items<'a, N> = job.items.iter().map(|&item| Ok(item));
+        let place = (header.start, job.guards.travel());
+        let (background, intake) = memory.storage.split(header.rules, place, items, (header.pulse, tick_s));
+        let mut intake = CorrectedIntake::from(intake);
+        if let &Some(StretchCorrection { stretch, knot_ticks, bound_mm_s, .. }) = correction {
+            intake.correct(Correction::new(stretch, &memory.knots_mm_s, knot_ticks, bound_mm_s)?)?;
+        }
+        let summary = RunSummary {
+            tick_s,
+            planned_time_s: info.planned_time_s,
+            path_length_mm: info.path_length_mm,
+            axes: info.axes.iter().map(|axis| AxisSummary::new(&axis.name, axis.letter)).collect(),
+            notices: info.notices.clone(),
+            end: RunEnd::Cut,
+            ..RunSummary::default()
+        };
+        Ok(Self {
+            job,
+            hardware,
+            config,
+            kernel,
+            background,
+            intake,
+            summary,
+            collector: Collector::new(),
+            contour: Contour::new(info.linear_places()),
+            limit_share: LimitShare::new(info),
+            probing: Probing::new(info),
+            commands: Commands::new(script.as_ref(), tick_s),
+            switches: Switches::new(&info.switch_lines),
+            stops: 0,
+            stopped_ticks: 0,
+            state: ExecState::Idle,
+            s_mm: 0.0,
+            goes_on: true,
+        })
     }
 
-    let mut summary = RunSummary {
-        tick_s,
-        planned_time_s: info.planned_time_s,
-        path_length_mm: info.path_length_mm,
-        axes: info.axes.iter().map(|axis| AxisSummary::new(&axis.name, axis.letter)).collect(),
-        notices: info.notices.clone(),
-        ..RunSummary::default()
-    };
-    let mut collector = Collector::new();
-    let mut contour = Contour::new(info.linear_places());
-    let mut limit_share = LimitShare::new(info);
-    let mut probing = Probing::new(info);
-    let mut commands = Commands::new(script.as_ref(), tick_s);
-    let mut switches = Switches::new(&info.switch_lines);
-    let (mut stops, mut stopped_ticks) = (0_u64, 0_u64);
-    let mut state = ExecState::Idle;
-    let mut goes_on = true;
-    summary.end = RunEnd::Cut;
-    let mut s_mm = 0.0;
-    while goes_on {
+    /// Runs a tick. False: it was the last one.
+    ///
+    /// # Errors
+    /// The background can't go on with the job.
+    pub fn tick(&mut self, observe: &mut Observer<'_, N>) -> Result<bool, RunError> {
+        let Self { job, hardware, kernel, background, intake, summary, collector, switches, .. } = self;
+        let Job { header, info, .. } = job;
         background
-            .poll((collector.ticks(), s_mm), state, (&mut switches, hardware))
+            .poll((collector.ticks(), self.s_mm), self.state, (&mut *switches, &mut **hardware))
             .map_err(RunError::Rejected)?;
-        let was_idle = state == ExecState::Idle;
-        let trace = *kernel.tick_corrected(&mut intake, hardware);
-        goes_on = hardware.advance(&trace);
-        state = trace.executed.state;
+        let was_idle = self.state == ExecState::Idle;
+        let trace = *kernel.tick_corrected(intake, &mut **hardware);
+        self.goes_on = hardware.advance(&trace);
+        let state = trace.executed.state;
+        self.state = state;
         // Only the next poll may find that outputs are to be switched.
-        stopped_ticks += u64::from(was_idle && state == ExecState::Idle && background.due().is_some());
+        self.stopped_ticks += u64::from(was_idle && state == ExecState::Idle && background.due().is_some());
         // What is idle after the last item is no longer part of the program, but for the tick in which
         // it ended.
         let ended = background.ended(state);
         let start_mm = info.starts_mm.get(trace.executed.stretches as usize).copied();
         let start_mm = start_mm.unwrap_or(info.path_length_mm);
-        let row = trace_row(&trace, start_mm, &mut contour);
+        let row = trace_row(&trace, start_mm, &mut self.contour);
         collector.add(&row);
-        limit_share.add(&row);
-        probing.tick(&trace);
-        commands.add(background.given(), &row);
-        s_mm = row.s_mm;
+        self.limit_share.add(&row);
+        self.probing.tick(&trace);
+        self.commands.add(background.given(), &row);
+        self.s_mm = row.s_mm;
         observe(&row);
         if let Some(fault) = trace.fault {
             summary.end = RunEnd::Faulted;
             if summary.faults.is_empty() {
                 let setpoints = &trace.executed.setpoints;
-                summary.faults.push(faults::traced(&fault, (header, info), &config, setpoints));
+                summary.faults.push(faults::traced(&fault, (header, info), &self.config, setpoints));
             }
-            switches.off(collector.ticks(), hardware);
-            if kernel.reaction() == Some(Reaction::Immediate) {
-                break;
-            }
-            continue;
+            switches.off(collector.ticks(), &mut **hardware);
+            return Ok(self.goes_on && kernel.reaction() != Some(Reaction::Immediate));
         }
         if let Some(end) = ended {
             summary.end = end;
             if end == RunEnd::Aborted {
-                switches.off(collector.ticks(), hardware);
+                switches.off(collector.ticks(), &mut **hardware);
             }
-            break;
+            return Ok(false);
         }
         if state == ExecState::Stopped {
-            stops += 1;
-            stopped_ticks += 1;
+            self.stops += 1;
+            self.stopped_ticks += 1;
             kernel.resume();
         }
+        Ok(self.goes_on)
     }
-    collector.fill(&mut summary);
-    summary.outputs = switches.noted();
-    match background.starvations() {
-        0 => {}
-        1 => summary.notices.push("1 stop on the path because data came too late".to_owned()),
-        more => summary.notices.push(format!("{more} stops on the path because data came too late")),
-    }
-    (summary.commands, summary.unreached) = commands.finish();
-    summary.limit_active_share = limit_share.share();
-    summary.time_s = (summary.ticks - stopped_ticks) as f64 * tick_s;
-    if stops > 0 {
-        summary.notices.push(match stops {
-            1 => "1 program stop: resumed at once".to_owned(),
-            _ => format!("{stops} program stops: resumed at once"),
-        });
-    }
-    let mut last = None;
-    for _ in 0..(SETTLE_S / tick_s) as u64 {
-        if !goes_on {
-            break;
+
+    /// Lets the machine settle, and tells what the run came to.
+    #[must_use]
+    pub fn finish(self) -> RunSummary {
+        let Self { job, hardware, mut kernel, background, mut intake, mut summary, mut probing, .. } = self;
+        let tick_s = job.header.tick_s;
+        self.collector.fill(&mut summary);
+        summary.outputs = self.switches.noted();
+        match background.starvations() {
+            0 => {}
+            1 => summary.notices.push("1 stop on the path because data came too late".to_owned()),
+            more => summary.notices.push(format!("{more} stops on the path because data came too late")),
         }
-        let trace = *kernel.tick_corrected(&mut intake, hardware);
-        goes_on = hardware.advance(&trace);
-        probing.tick(&trace);
-        last = Some(trace);
+        (summary.commands, summary.unreached) = self.commands.finish();
+        summary.limit_active_share = self.limit_share.share();
+        summary.time_s = (summary.ticks - self.stopped_ticks) as f64 * tick_s;
+        match self.stops {
+            0 => {}
+            1 => summary.notices.push("1 program stop: resumed at once".to_owned()),
+            more => summary.notices.push(format!("{more} program stops: resumed at once")),
+        }
+        let mut goes_on = self.goes_on;
+        let mut last = None;
+        for _ in 0..(SETTLE_S / tick_s) as u64 {
+            if !goes_on {
+                break;
+            }
+            let trace = *kernel.tick_corrected(&mut intake, hardware);
+            goes_on = hardware.advance(&trace);
+            probing.tick(&trace);
+            last = Some(trace);
+        }
+        summary.probes = probing.finish();
+        summary.notices.extend(summary.probes.iter().filter_map(Probed::disagreement));
+        let end = last.iter().flat_map(|trace| &trace.axes);
+        for ((axis, end), figures) in summary.axes.iter_mut().zip(end).zip(&job.header.axes) {
+            let error_mm = end.following_error_mm.to_f64();
+            axis.end_error_counts = (error_mm / figures.mm_per_count.abs()).round() as i64;
+        }
+        summary
     }
-    summary.probes = probing.finish();
-    summary.notices.extend(summary.probes.iter().filter_map(Probed::disagreement));
-    let end = last.iter().flat_map(|trace| &trace.axes);
-    for ((axis, end), figures) in summary.axes.iter_mut().zip(end).zip(&header.axes) {
-        let error_mm = end.following_error_mm.to_f64();
-        axis.end_error_counts = (error_mm / figures.mm_per_count.abs()).round() as i64;
-    }
-    Ok(summary)
 }
 
 pub(crate) fn trace_row<R: Real, const N: usize>(

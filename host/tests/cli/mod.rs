@@ -6,6 +6,7 @@ mod drive;
 mod files;
 mod machines;
 mod options;
+mod page;
 mod planning;
 mod reading;
 mod probing;

@@ -1,10 +1,11 @@
 //! The page in a browser: what it shows is what the run came to, and it answers pointers, wheel and keys.
 //!
-//! Needs `chromium` and `chromedriver`; without them every test is listed and ignored with the reason, but fails where
-//! `CI=true`. Work is counted, and no clock is read.
+//! Needs `chromium` and `chromedriver`, the playground also what `host/wasm/build` needs, and one test node; without them a test is
+//! listed and ignored with the reason, but fails where `CI=true`. Work is counted, and no clock is read.
 
 mod browser;
 mod made_up;
+mod playground;
 mod panel;
 mod report;
 #[allow(dead_code, reason = "the suite uses the rest of it")]
@@ -34,11 +35,24 @@ const TESTS: [(&str, fn()); 16] = [
     ("tabs_share_a_machine_and_come_back_to_it", panel::tabs_share_a_machine_and_come_back_to_it),
 ];
 
+/// Tests that need the module, too.
+const OF_MODULE: [(&str, fn()); 10] = [
+    ("the_browser_has_the_same_bits", playground::the_browser_has_the_same_bits),
+    ("it_runs_what_it_is_given", playground::it_runs_what_it_is_given),
+    ("sliders_change_the_machine", playground::sliders_change_the_machine),
+    ("files_are_dropped", playground::files_are_dropped),
+    ("refusals_are_shown", playground::refusals_are_shown),
+    ("a_long_run_is_cancelled", playground::a_long_run_is_cancelled),
+    ("drives_are_measured", playground::drives_are_measured),
+    ("axes_are_tuned", playground::axes_are_tuned),
+    ("a_ramp_is_that_of_profile", playground::a_ramp_is_that_of_profile),
+    ("a_phone_shows_the_playground", playground::a_phone_shows_the_playground),
+];
+
 fn main() -> ExitCode {
     let arguments = Arguments::from_args();
     let is_ci = std::env::var("CI").is_ok_and(|value| value == "true");
-    let reason = browser::missing();
-    let trial = |(name, test): (&'static str, fn())| {
+    let trial = |(name, test): (&'static str, fn()), reason: &Option<String>| {
         let missing = reason.clone();
         let run = move || match missing {
             None => {
@@ -47,11 +61,17 @@ fn main() -> ExitCode {
             }
             Some(reason) => Err(Failed::from(reason)),
         };
-        match &reason {
+        match reason {
             // The kind is what the harness prints next to the name.
             Some(reason) if !is_ci => Trial::test(name, run).with_kind(reason).with_ignored_flag(true),
             _ => Trial::test(name, run),
         }
     };
-    libtest_mimic::run(&arguments, TESTS.map(trial).into()).exit_code()
+    let (no_browser, no_module) = (browser::missing(), playground::missing());
+    let no_playground = no_browser.clone().or(no_module.clone());
+    let no_node = no_module.or_else(playground::node_missing);
+    let mut trials: Vec<Trial> = TESTS.into_iter().map(|test| trial(test, &no_browser)).collect();
+    trials.extend(OF_MODULE.into_iter().map(|test| trial(test, &no_playground)));
+    trials.push(trial(("node_has_the_same_bits", playground::node_has_the_same_bits), &no_node));
+    libtest_mimic::run(&arguments, trials).exit_code()
 }

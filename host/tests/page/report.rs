@@ -5,8 +5,8 @@ use serde_json::Value;
 use crate::browser::Browser;
 use crate::workspace::{STRINGER, Workspace, number};
 
-const DESK: [u32; 2] = [1400, 1000];
-const PHONE: [u32; 2] = [390, 844];
+pub(crate) const DESK: [u32; 2] = [1400, 1000];
+pub(crate) const PHONE: [u32; 2] = [390, 844];
 
 /// Keys by their names.
 const RIGHT: char = '\u{E014}';
@@ -45,14 +45,14 @@ impl Demonstration {
 }
 
 /// The first number in a text of the page.
-fn first_number(text: &str) -> f64 {
+pub(crate) fn first_number(text: &str) -> f64 {
     let plain = text.replace('\u{202f}', "").replace('−', "-");
     let end = plain.find(|c: char| !(c.is_ascii_digit() || ".-".contains(c))).unwrap_or(plain.len());
     plain[..end].parse().unwrap_or_else(|_| panic!("{text} begins with no number"))
 }
 
 /// As near as so many significant digits tell.
-fn assert_near(shown: f64, true_value: f64, digits: i32, what: &str) {
+pub(crate) fn assert_near(shown: f64, true_value: f64, digits: i32, what: &str) {
     let half = 0.5 * 10f64.powi(true_value.abs().log10().floor() as i32 + 1 - digits);
     assert!((shown - true_value).abs() <= half * 1.000_001, "{what}: {shown} is shown, {true_value} it is");
 }

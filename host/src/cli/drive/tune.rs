@@ -9,7 +9,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::axis_named;
-use super::verification::{Verification, VerificationJson, planes};
+use super::verification::{Verification, VerificationJson};
 use crate::cli::error::{CliError, Outcome};
 use crate::cli::outputs::{self, Written};
 use crate::cli::table::{self, Align};
@@ -18,6 +18,7 @@ use crate::drive::circle_motion::Circle;
 use crate::drive::identification::identify_axes;
 use crate::drive::learning::{LearningOptions, Learnt, Model, Reason, learn};
 use crate::drive::reference::CIRCLE_FEED_MM_S;
+use crate::drive::verification::planes;
 use crate::files::Files;
 use crate::identify::{Estimate, Identification};
 use crate::machine::{AxisEdit, Machine, REFERENCE_TOML, edited};

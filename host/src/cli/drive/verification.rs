@@ -8,40 +8,16 @@ use super::super::error::CliError;
 use super::super::progress::Progress;
 use super::super::table::{self, Align};
 use crate::drive::circle::{CircleFigures, Sweep, figures};
-use crate::drive::circle_motion::{Circle, plane_of};
 use crate::drive::reference::CIRCLE_FEED_MM_S;
+use crate::drive::verification::{VERIFIED_HZ, circle, is_no_worse, planes};
 use crate::gcode::Plane;
 use crate::machine::Machine;
 use crate::report::{self, drive::Shown};
 
-/// Frequencies of the circles \[Hz\].
-const VERIFIED_HZ: [f64; 6] = [1.0, 4.0, 10.0, 13.0, 16.0, 28.0];
 /// Frequencies whose circles the report draws \[Hz\].
 const SHOWN_HZ: [f64; 2] = [4.0, 13.0];
 /// The contour error that S4 asks for \[µm\].
 const LIMIT_UM: f64 = 20.0;
-/// How much worse a circle may get, in counts of the encoder.
-const WORSE_COUNTS: f64 = 2.0;
-
-/// The planes whose circles move every axis of `tuned`, those in which both axes are tuned first.
-pub(super) fn planes(tuned: &[usize]) -> Vec<Plane> {
-    let mut planes: Vec<Plane> = Vec::new();
-    let is_covered =
-        |planes: &[Plane], axis: usize| planes.iter().any(|plane| plane.axes()[..2].contains(&axis));
-    for plane in [Plane::Xy, Plane::Zx, Plane::Yz] {
-        let axes = &plane.axes()[..2];
-        let is_new = axes.iter().any(|axis| !is_covered(&planes, *axis));
-        if is_new && axes.iter().all(|axis| tuned.contains(axis)) {
-            planes.push(plane);
-        }
-    }
-    for &axis in tuned {
-        if !is_covered(&planes, axis) {
-            planes.push(plane_of(axis));
-        }
-    }
-    planes
-}
 
 /// Circles before and after.
 pub(super) struct Verification {
@@ -62,23 +38,9 @@ impl Verified {
         self.before.circles.iter().zip(&self.after.circles)
     }
 
-    /// If both axes were tuned, the contour error counts. If only one was, its following error counts: the
-    /// contour error is the difference of two axes, so improving one of two that lag alike may increase it.
-    fn judged_um(&self, circle: &CircleFigures) -> f64 {
-        match self.is_tuned {
-            [true, false] => circle.following_um[0],
-            [false, true] => circle.following_um[1],
-            _ => circle.contour_um(),
-        }
-    }
-
     /// Whether no circle got worse, but for the encoders' rounding.
     fn is_better(&self) -> bool {
-        let step_um = |axis: usize| self.after.machine.axes[axis].mm_per_count.abs() * 1e3;
-        self.pairs().all(|(before, after)| {
-            let margin_um = WORSE_COUNTS * before.axes.map(step_um).into_iter().fold(0.0, f64::max);
-            self.judged_um(after) <= self.judged_um(before) + margin_um
-        })
+        self.pairs().all(|(before, after)| is_no_worse(&self.after.machine, self.is_tuned, before, after))
     }
 }
 
@@ -94,7 +56,7 @@ impl Verification {
         let mut sweep = |name: &'static str, machine: &Machine, plane: Plane| -> Result<Sweep, CliError> {
             let mut circles = Vec::with_capacity(VERIFIED_HZ.len());
             for frequency_hz in VERIFIED_HZ {
-                let circle = Circle { plane, ..Circle::new(frequency_hz, CIRCLE_FEED_MM_S) };
+                let circle = circle(plane, frequency_hz);
                 let recording = circle.record(machine)?;
                 circles.push(figures(&recording, &circle)?);
                 if SHOWN_HZ.contains(&frequency_hz) {
@@ -222,24 +184,4 @@ struct CircleJson {
     form_deviation_um: f64,
     following_error_first_um: f64,
     following_error_second_um: f64,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_tuned_axis_moves_beside_another_if_it_can() {
-        for (tuned, expected) in [
-            (&[0][..], &[Plane::Xy][..]),
-            (&[1], &[Plane::Xy]),
-            (&[2], &[Plane::Zx]),
-            (&[0, 1], &[Plane::Xy]),
-            (&[2, 0], &[Plane::Zx]),
-            (&[1, 2], &[Plane::Yz]),
-            (&[0, 1, 2], &[Plane::Xy, Plane::Zx]),
-        ] {
-            assert_eq!(planes(tuned), expected, "{tuned:?}");
-        }
-    }
 }

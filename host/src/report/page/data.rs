@@ -185,7 +185,12 @@ fn with_header(header: &Header<'_>, columns: &[u8]) -> io::Result<Vec<u8>> {
 
 /// Parts behind each other, compressed.
 pub(super) fn compressed(parts: &[&[u8]]) -> io::Result<Vec<u8>> {
-    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
+    compressed_to(Compression::default(), parts)
+}
+
+/// The same, as closely as this.
+pub(super) fn compressed_to(level: Compression, parts: &[&[u8]]) -> io::Result<Vec<u8>> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), level);
     parts.iter().try_for_each(|part| encoder.write_all(part))?;
     encoder.finish()
 }

@@ -7,10 +7,15 @@
 mod column;
 mod data;
 mod outline;
+#[cfg(feature = "terminal")]
+mod playground;
 mod samples;
 mod worst;
 
 use std::io::{self, Write};
+
+#[cfg(feature = "terminal")]
+pub use self::playground::{Playground, Sheet};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
@@ -241,6 +246,11 @@ pub(crate) mod reading {
 
         pub(crate) fn of(page: &str, name: &str) -> Self {
             Self::of_bytes(&Self::text(page, name))
+        }
+
+        /// What is not embedded.
+        pub(crate) fn of_data(data: &[u8]) -> Self {
+            Self::of_bytes(&inflated(data))
         }
 
         fn of_bytes(bytes: &[u8]) -> Self {
