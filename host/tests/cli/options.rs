@@ -2,7 +2,7 @@
 
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::TcpStream;
-use std::process::Stdio;
+use std::process::{Child, Stdio};
 
 use super::workspace::{STRINGER, Workspace, number};
 
@@ -41,23 +41,27 @@ fn a_panel_is_for_this_computer_unless_there_is_a_token() {
 #[test]
 fn a_panel_is_served_to_this_computer_alone() {
     let workspace = Workspace::new("panel-served");
-    let mut panel = workspace
-        .command(&["panel", "--listen", "127.0.0.1:0"])
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("motion starts");
+    /// It ends with the test, however that ends.
+    struct Running(Child);
+    impl Drop for Running {
+        fn drop(&mut self) {
+            let _ = self.0.kill();
+            let _ = self.0.wait();
+        }
+    }
+    let mut command = workspace.command(&["panel", "--listen", "127.0.0.1:0"]);
+    let mut panel = Running(command.stdout(Stdio::piped()).spawn().expect("motion starts"));
     let mut line = String::new();
-    BufReader::new(panel.stdout.take().expect("its output")).read_line(&mut line).expect("text");
+    BufReader::new(panel.0.stdout.take().expect("its output")).read_line(&mut line).expect("text");
     let host = line.trim().rsplit_once("http://").expect(&line).1.trim_end_matches('/').to_owned();
     let status = |path: &str, headers: &str| {
         let mut wire = TcpStream::connect(&host).expect("there");
-        write!(wire, "GET {path} HTTP/1.1\r\n{headers}Connection: close\r\n\r\n").expect("sent");
+        write!(wire, "GET {path} HTTP/1.1\r\n{headers}\r\n").expect("sent");
         let mut answer = String::new();
         BufReader::new(wire).read_line(&mut answer).expect("an answer");
         answer.split(' ').nth(1).expect("a status").to_owned()
     };
-    let upgrade =
-        "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n";
+    let upgrade = "Connection: Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n";
     let host_of = |name: &str| format!("Host: {name}\r\n");
     assert_eq!(status("/", &host_of(&host)), "200");
     assert_eq!(status("/picture/1/data", &host_of(&host)), "404");
@@ -68,8 +72,9 @@ fn a_panel_is_served_to_this_computer_alone() {
     assert_eq!(status("/socket", &foreign), "403");
     // A socket that no page has opened.
     assert_eq!(status("/socket", &format!("{}{upgrade}", host_of(&host))), "403");
-    let _ = panel.kill();
-    let _ = panel.wait();
+    // A page of its own is let in.
+    let own = format!("{}Origin: http://{host}\r\n{upgrade}", host_of(&host));
+    assert_eq!(status("/socket", &own), "101");
 }
 
 /// A moment is a tick, a time, or a program line.
