@@ -134,13 +134,16 @@ fn ticks_around_a_trigger_are_captured() {
     let board = &mut *board;
     let refused = board.capture(Some("A_err_um>1".parse().expect("a condition")), 1, 1);
     assert!(matches!(refused, Err(BoardError::Trigger(_))), "{refused:?}");
-    assert!(matches!(board.capture(None, 600_000, 0), Err(BoardError::Capture { ticks: 600_000 })));
+    for (before, after) in [(120_000, 1), (usize::MAX, 2), (usize::MAX, usize::MAX)] {
+        assert!(matches!(board.capture(None, before, after), Err(BoardError::Capture { .. })));
+    }
     switch_on(board);
     board.capture(Some("v_mm_s>30".parse().expect("a condition")), 100, 200).expect("a scope");
     assert!(board.state().is_capturing && board.take_capture().is_none());
     assert!(matches!(load(board, SQUARE), BoardEvent::Loaded(_)));
     board.start().expect("on");
-    wait_for(board, LONGEST, &mut |event| matches!(event, BoardEvent::Captured)).expect("triggered");
+    wait_for(board, LONGEST, &mut |event| matches!(event, BoardEvent::Captured { missing: 0 }))
+        .expect("triggered");
     let trace = board.take_capture().expect("ticks");
     assert!(!board.state().is_capturing);
     let first = trace.ticks[0].tick;
@@ -154,7 +157,8 @@ fn ticks_around_a_trigger_are_captured() {
     board.abort();
     // The next ones, whatever they are.
     board.capture(None, 0, 50).expect("a scope");
-    wait_for(board, LONGEST, &mut |event| matches!(event, BoardEvent::Captured)).expect("ticks");
+    wait_for(board, LONGEST, &mut |event| matches!(event, BoardEvent::Captured { missing: 0 }))
+        .expect("ticks");
     assert_eq!(board.take_capture().map(|trace| trace.ticks.len()), Some(50));
     assert!(board.take_capture().is_none());
 }

@@ -12,7 +12,7 @@ use motion_host::board::items::Source;
 use motion_host::board::trigger::Condition;
 use motion_host::gcode::{AXES_MAX, ReadOptions};
 use motion_host::panel::desk::{Desk, KEY_SILENCE, Order, Tab};
-use motion_host::panel::message::Command;
+use motion_host::panel::message::{Command, Said};
 use motion_host::simulate::jog::Press;
 use motion_host::trace::RunTrace;
 use serde_json::Value;
@@ -146,7 +146,8 @@ fn desk() -> (Desk, Noted) {
         axes: vec![axis],
     };
     let board = Noting { noted: noted.clone(), info, under_way: UnderWay::Nothing };
-    let desk = Desk::start(Box::new(board), ReadOptions::default(), Arc::new(|_| None));
+    let desk =
+        Desk::start(Box::new(board), ReadOptions::default(), Arc::new(|_| Err("no picture".to_owned())));
     (desk, noted)
 }
 
@@ -166,9 +167,19 @@ impl Seat {
         Self { tab, orders, told }
     }
 
+    /// Says a command, at the state that was told last.
     fn say(&self, command: &str) {
+        let mut heard = None;
+        while heard.is_none() {
+            // At least one is told a second.
+            heard = self.hears("state")["number"].as_u64();
+        }
+        self.say_at(heard.unwrap_or(0), command);
+    }
+
+    fn say_at(&self, heard: u64, command: &str) {
         let command: Command = serde_json::from_str(command).expect(command);
-        self.orders.send(Order::Command(self.tab, command)).expect("a desk");
+        self.orders.send(Order::Command(self.tab, Said { heard, command })).expect("a desk");
     }
 
     /// The next message of a type.
@@ -274,10 +285,14 @@ fn all_tabs_see_the_same() {
     first.orders.send(Order::Joined(2, listener)).expect("a desk");
     first.say(r#"{"do": "load", "name": "a.ngc", "text": "G1 X1 F100"}"#);
     noted.wait_for("load a.ngc", 1);
-    noted.events.lock().expect("alive").push(BoardEvent::Loaded(vec!["a remark".to_owned()]));
-    let program = first.hears("program");
-    assert_eq!((&program["name"], &program["text"]), (&"a.ngc".into(), &"G1 X1 F100".into()));
-    assert_eq!(first.hears("event")["text"], "note: a remark");
+    noted
+        .events
+        .lock()
+        .expect("alive")
+        .push(BoardEvent::Loaded(vec!["a remark".to_owned(), "another".to_owned()]));
+    assert_eq!(first.hears("program")["name"], "a.ngc");
+    // In one message, however many they are.
+    assert_eq!(first.hears("event")["text"], "a remark; another");
     // It has gone with the first thing that it needed and did not take.
     assert_eq!(deaf.load(Ordering::Relaxed), 1);
     let third = Seat::take(&desk, 3);
@@ -301,4 +316,60 @@ fn all_tabs_see_the_same() {
     let fourth = Seat::take(&desk, 4);
     fourth.hears_commander("another");
     assert!(fourth.told.try_iter().all(|told| told["type"] != "program"));
+}
+
+/// A held key stays held as long as its tab says so; what is said of a key that another tab has taken away is not refused.
+#[test]
+fn a_key_is_held_while_its_tab_says_so() {
+    let (desk, noted) = desk();
+    let (first, second) = (Seat::take(&desk, 1), Seat::take(&desk, 2));
+    let press = r#"{"do": "press", "key": "Y+5", "feed_mm_s": null, "is_held": true}"#;
+    let keep = r#"{"do": "keep"}"#;
+    first.say(press);
+    noted.wait_for("press Y+5 None", 1);
+    let (begin, mut last, mut longest) = (Instant::now(), Instant::now(), Duration::ZERO);
+    while begin.elapsed() < 4 * KEY_SILENCE {
+        first.say_at(0, keep);
+        longest = longest.max(last.elapsed());
+        last = Instant::now();
+        thread::sleep(KEY_SILENCE / 10);
+    }
+    let is_released = noted.calls().iter().any(|call| call == "release");
+    // Unless this test itself was not running.
+    assert!(!is_released || longest > KEY_SILENCE / 2, "{longest:?}");
+    second.say(r#"{"do": "take"}"#);
+    second.hears_commander("you");
+    first.say_at(0, keep);
+    first.say(press);
+    // The press is refused, and nothing before it was.
+    let refused = first.hears("refused");
+    assert!(refused["text"].as_str().is_some_and(|text| text.starts_with("another tab")));
+    assert!(first.told.try_iter().all(|told| told["type"] != "refused"));
+}
+
+/// What may move the machine comes in time or not at all.
+#[test]
+fn a_command_that_comes_late_moves_nothing() {
+    let (desk, noted) = desk();
+    let seat = Seat::take(&desk, 1);
+    let old = seat.hears("state")["number"].as_u64().expect("a number");
+    thread::sleep(Duration::from_millis(2600));
+    for command in [
+        r#"{"do": "start"}"#,
+        r#"{"do": "resume"}"#,
+        r#"{"do": "drives", "are_on": true}"#,
+        r#"{"do": "press", "key": "X+1", "feed_mm_s": null, "is_held": false}"#,
+    ] {
+        for heard in [old, 0, u64::MAX] {
+            seat.say_at(heard, command);
+            let refused = seat.hears("refused");
+            assert!(refused["text"].as_str().is_some_and(|text| text.contains("too late")), "{refused}");
+        }
+    }
+    assert!(noted.calls().is_empty(), "{:?}", noted.calls());
+    // Stops are never too late.
+    seat.say_at(old, r#"{"do": "hold"}"#);
+    noted.wait_for("hold", 1);
+    seat.say(r#"{"do": "resume"}"#);
+    noted.wait_for("resume", 1);
 }

@@ -13,9 +13,10 @@ const JOGS = { ArrowLeft: ["X", "-"], ArrowRight: ["X", "+"], ArrowDown: ["Y", "
 const OVERRIDES = "`1234567890";
 
 export class Controls {
-  constructor(root, link) {
+  constructor(root, link, complain) {
     this.root = root;
     this.link = link;
+    this.complain = complain;
     this.state = null;
     this.board = null;
     /** What holds the jog key down: a pointer or a key of the keyboard. */
@@ -24,24 +25,30 @@ export class Controls {
     this.field("single_block", "do").addEventListener("change", ({ target }) => this.say("single_block", { is_on: target.checked }));
     const override = this.field("override", "do");
     override.addEventListener("input", () => this.say("override", { permille: 10 * Number(override.value) }));
-    override.closest("label").addEventListener("wheel", (event) => {
+    // Whoever scrolls the page means the page: the slider is chosen first.
+    override.addEventListener("wheel", (event) => {
+      if (document.activeElement !== override || event.deltaY === 0) return;
       event.preventDefault();
-      this.setOverride(Number(override.value) + (event.deltaY < 0 ? 5 : -5));
+      this.setOverride(Number(override.value) + (event.deltaY < 0 ? 1 : -1));
     }, { passive: false });
     this.field("jog_share").addEventListener("input", () => this.tellFeed());
     root.querySelector("input[type=file]").addEventListener("change", ({ target }) => {
       if (target.files[0]) this.load(target.files[0]);
       target.value = "";
+      target.blur();
     });
+    // Keys are the panel's again.
+    this.field("distance").addEventListener("change", ({ target }) => target.blur());
     addEventListener("dragover", (event) => event.preventDefault());
     addEventListener("drop", (event) => {
       event.preventDefault();
       if (event.dataTransfer.files[0]) this.load(event.dataTransfer.files[0]);
     });
     addEventListener("keydown", (event) => this.keyDown(event));
-    addEventListener("keyup", ({ key }) => this.release(key));
+    addEventListener("keyup", (event) => this.keyUp(event));
     addEventListener("pointerup", () => this.release("pointer"));
     addEventListener("pointercancel", () => this.release("pointer"));
+    addEventListener("lostpointercapture", () => this.release("pointer"));
     // Whoever looks elsewhere holds no key.
     addEventListener("blur", () => this.release(this.held));
     document.addEventListener("visibilitychange", () => this.release(this.held));
@@ -52,10 +59,25 @@ export class Controls {
   }
 
   say(what, more = {}) {
-    this.link.say({ do: what, ...more });
+    const isSaid = this.link.say({ do: what, ...more });
+    if (!isSaid && what !== "keep" && what !== "release") this.complain(`${what}: nobody is there to hear it`);
+  }
+
+  /** The server is not there: what is pressed now is not said. */
+  lose() {
+    this.drop();
+    for (const button of this.root.querySelectorAll("button")) button.disabled = true;
+  }
+
+  /** A key that is down is not held any more. */
+  drop() {
+    clearInterval(this.keeping);
+    this.keeping = undefined;
+    this.held = null;
   }
 
   showBoard(board) {
+    this.drop();
     this.board = board;
     const keys = this.root.querySelector(".keys");
     keys.replaceChildren(...board.axes.flatMap(({ name }) => ["-", "+"].map((direction) => {
@@ -64,6 +86,7 @@ export class Controls {
       button.textContent = `${name} ${direction === "-" ? "−" : "+"}`;
       button.dataset.key = name + direction;
       button.addEventListener("pointerdown", (event) => {
+        if (event.button !== 0) return;
         // The press stays with the button, wherever the pointer goes.
         button.setPointerCapture(event.pointerId);
         this.press(name, direction, "pointer");
@@ -85,17 +108,21 @@ export class Controls {
       clear_fault: state.fault !== null,
       start: isFree && !isOff && state.program !== null,
       resume: state.under_way !== "nothing" && (state.state === "held" || state.state === "program stop"),
-      capture: !state.is_capturing,
+      hold: true,
+      abort: true,
+      capture: true,
     };
     for (const [what, is] of Object.entries(may)) this.field(what, "do").disabled = !is;
-    for (const button of this.root.querySelectorAll("[data-key]")) button.disabled = isOff || state.under_way === "program";
-    this.field("capture", "do").textContent = state.is_capturing ? "Waiting for the trigger" : "Capture";
+    // A button that is switched off while it is down tells nobody of its release.
+    const mayJog = !isOff && state.under_way !== "program";
+    for (const button of this.root.querySelectorAll("[data-key]")) button.disabled = !mayJog && this.held === null;
+    this.field("capture", "do").textContent = state.is_capturing ? "Waiting: capture anew" : "Capture";
     this.field("single_block", "do").checked = state.is_single_block;
     const override = this.field("override", "do");
     if (document.activeElement !== override) override.value = state.override_permille / 10;
   }
 
-  /** Greatest feed of an axis, as far as the slider goes [mm/s]. */
+  /** The feed of a jog key: the share of the axis' greatest one that the slider has [mm/s]. */
   feedOf(name) {
     const axis = this.board.axes.find((other) => other.name === name);
     return axis.feed_mm_s * (Number(this.field("jog_share").value) / 100);
@@ -133,21 +160,34 @@ export class Controls {
   }
 
   keyDown(event) {
-    const { key, target } = event;
-    if (event.ctrlKey || event.altKey || event.metaKey) return;
-    // Esc ends motion wherever it is pressed; other keys belong to fields and plots that have them.
-    const isTaken = target.closest?.("input:not([type=range]):not([type=checkbox]),select,textarea,[role=application],[role=listbox],.stage");
-    if (isTaken && key !== "Escape") return;
-    const jog = JOGS[key];
+    const { key, code, target } = event;
+    // With a modifier a key is another one, and some of them are never told to be up again.
+    if (event.ctrlKey || event.altKey || event.metaKey) {
+      this.release(this.held);
+      return;
+    }
+    const isText = target.closest?.("input[type=text],input[type=number],textarea");
     const command = COMMANDS[key.length === 1 ? key.toLowerCase() : key];
+    // Stops are obeyed wherever they are pressed, but for a letter that is being written.
+    const isStop = key === "Escape" || (command === "hold" && !isText);
+    // Plots, path, lists and sliders have keys of their own.
+    const isTaken = isText || target.closest?.("select,input[type=range],[role=application],[role=listbox],.stage");
+    if (isTaken && !isStop) return;
+    const jog = JOGS[key];
     const override = key.length === 1 ? OVERRIDES.indexOf(key) : -1;
     if (jog) {
-      if (target.matches?.("input[type=range]")) return;
-      if (!event.repeat && this.board?.axes.some(({ name }) => name === jog[0])) this.press(...jog, key);
-    } else if (command && !event.repeat) this.act(command);
-    else if (override >= 0) this.setOverride(10 * override);
+      if (!event.repeat && this.board?.axes.some(({ name }) => name === jog[0])) this.press(...jog, code);
+    } else if (command) {
+      if (!event.repeat) this.act(command);
+    } else if (override >= 0) this.setOverride(10 * override);
     else return;
     event.preventDefault();
+  }
+
+  keyUp({ code, key }) {
+    // By the place of the key: what it is called may have changed since.
+    this.release(code);
+    if (["Shift", "Control", "Alt", "Meta", "NumLock"].includes(key) && this.held !== "pointer") this.release(this.held);
   }
 
   press(name, direction, by) {
@@ -163,10 +203,8 @@ export class Controls {
 
   release(by) {
     if (this.held === null || this.held !== by) return;
-    this.held = null;
-    clearInterval(this.keeping);
     // A distance is driven to its end.
     if (this.keeping !== undefined) this.say("release");
-    this.keeping = undefined;
+    this.drop();
   }
 }

@@ -48,9 +48,10 @@ export class Display {
     this.root.dataset.state = state.state ?? "";
     this.root.dataset.fault = String(state.fault !== null);
     const isResting = state.under_way === "nothing" && state.state === "held";
-    this.set("state", state.is_lost ? "board lost" : isResting ? "ready" : state.state ?? "connecting");
+    this.set("state", state.is_lost ? "board lost" : isResting && !state.is_foreign ? "ready" : state.state ?? "connecting");
     const detail = { nothing: "", program: "the program", jog: "a jog" }[state.under_way];
-    this.set("detail", state.is_ready ? detail : "inputs do not allow the drives to be on");
+    const foreign = "a program that was not begun here: Abort gives it up";
+    this.set("detail", !state.is_ready ? "inputs do not allow the drives to be on" : state.is_foreign ? foreign : detail);
     const fault = this.fields.get("fault");
     fault.hidden = state.fault === null;
     this.set("fault", state.fault === null ? "" : `Fault: ${state.fault}`);

@@ -2,33 +2,39 @@
 
 /** A machine that is this near is on the path [mm]. */
 const NEAR_MM = 0.05;
-/** Corners to look through from where it was, before all of them. */
+/** Corners to look through from where it was, before all of them, and how often all of them [ms]. */
 const AHEAD = 400;
+const ALL_EVERY_MS = 500;
 
 export class Follower {
   constructor(run) {
     this.run = run;
     this.at = 0;
+    this.lookedMs = 0;
   }
 
-  /** The tick of the place that is nearest to `position`, by axis; undefined where it is off the path. */
-  tick(position) {
+  /** The tick of the place of `line` that is nearest to `position`, by axis; undefined where it is off the path. */
+  tick(position, line) {
     const { ticks } = this.run.outline;
     const last = ticks.length - 1;
     if (last < 1) return undefined;
-    let found = this.nearest(position, this.at, Math.min(last, this.at + AHEAD));
-    if (found.mm > NEAR_MM) found = this.nearest(position, 0, last);
+    let found = this.nearest(position, line, this.at, Math.min(last, this.at + AHEAD));
+    if (found.mm > NEAR_MM && performance.now() - this.lookedMs > ALL_EVERY_MS) {
+      this.lookedMs = performance.now();
+      found = this.nearest(position, line, 0, last);
+    }
     if (found.mm > NEAR_MM) return undefined;
     this.at = found.corner;
     return this.run.tickBetween(ticks[found.corner], ticks[found.corner + 1], found.part);
   }
 
-  /** The nearest place between two corners. */
-  nearest(position, from, to) {
-    const { places } = this.run.outline;
+  /** The nearest place between two corners. A path that comes back on itself is told apart by its lines. */
+  nearest(position, line, from, to) {
+    const { places, ticks } = this.run.outline;
     const axes = places.map((_, axis) => axis).filter((axis) => places[axis]);
     let best = { mm: Infinity, corner: from, part: 0 };
     for (let corner = from; corner < to; corner += 1) {
+      if (line && this.run.lineAt((ticks[corner] + ticks[corner + 1]) / 2) !== line) continue;
       let along = 0;
       let length = 0;
       for (const axis of axes) {

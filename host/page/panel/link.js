@@ -7,6 +7,8 @@ export class Link {
   constructor(onTold, onUp) {
     this.onTold = onTold;
     this.onUp = onUp;
+    /** The number of the state heard last: a command says what it was given at. */
+    this.heard = 0;
     this.open();
   }
 
@@ -15,7 +17,11 @@ export class Link {
     const socket = new WebSocket(`ws://${host}/socket${search}`);
     this.socket = socket;
     socket.addEventListener("open", () => this.onUp(true));
-    socket.addEventListener("message", ({ data }) => this.onTold(JSON.parse(data)));
+    socket.addEventListener("message", ({ data }) => {
+      const told = JSON.parse(data);
+      if (told.type === "state") this.heard = told.number;
+      this.onTold(told);
+    });
     // A failure closes it, too.
     socket.addEventListener("close", () => {
       this.onUp(false);
@@ -23,8 +29,10 @@ export class Link {
     });
   }
 
-  /** Says a command; it is lost where nobody is there, as is whatever it would have moved. */
+  /** Says a command; false where nobody is there. */
   say(command) {
-    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(command));
+    if (this.socket.readyState !== WebSocket.OPEN) return false;
+    this.socket.send(JSON.stringify({ heard: this.heard, command }));
+    return true;
   }
 }

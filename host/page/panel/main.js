@@ -17,21 +17,36 @@ class Pictures {
   constructor() {
     this.choice = document.querySelector(".pictures");
     this.runs = {};
+    /** The numbers of the latest ones. */
+    this.numbers = {};
     this.shown = null;
     this.page = null;
     this.follower = null;
   }
 
   async fetch(of, number) {
+    this.numbers[of] = number;
     const get = async (part) => {
       const response = await fetch(`/picture/${number}/${part}${location.search}`);
       return response.status === 200 ? inflateBytes(new Uint8Array(await response.arrayBuffer())) : null;
     };
     const [data, program] = await Promise.all([get("data"), get("program")]);
     // A later one has taken its place.
-    if (!data) return;
+    if (!data || this.numbers[of] !== number) return;
     this.runs[of] = { data: new Data(data), program: program && JSON.parse(new TextDecoder().decode(program)) };
     this.choose(of);
+  }
+
+  /** Another program is loaded: the picture of the one before is over. */
+  forget() {
+    delete this.runs.program;
+    delete this.numbers.program;
+    this.follower = null;
+    if (this.runs.capture) this.choose("capture");
+    else if (this.page) {
+      this.page = show([]);
+      this.choice.hidden = true;
+    }
   }
 
   choose(of) {
@@ -50,11 +65,11 @@ class Pictures {
   }
 
   /** Moves the cursor to where the machine is, unless a pointer has it. */
-  follow({ under_way, set_mm }) {
+  follow({ under_way, set_mm, line }) {
     if (!this.follower || under_way !== "program") return;
     const { state } = this.page;
     if (state.cursor !== state.placed) return;
-    const tick = this.follower.tick(set_mm);
+    const tick = this.follower.tick(set_mm, line);
     if (tick !== undefined) state.place(tick);
   }
 }
@@ -63,9 +78,11 @@ function start() {
   const root = document.getElementById("panel");
   const display = new Display(root);
   const pictures = new Pictures();
-  const seen = {};
-  const link = new Link(told, (isUp) => display.showUp(isUp));
-  const controls = new Controls(root, link);
+  const link = new Link(told, (isUp) => {
+    display.showUp(isUp);
+    if (!isUp) controls?.lose();
+  });
+  const controls = new Controls(root, link, (text) => display.say(text, "refused"));
 
   function told(message) {
     switch (message.type) {
@@ -82,19 +99,20 @@ function start() {
         display.say(message.text, message.is_failure ? "failure" : "");
         break;
       case "refused":
+        controls.drop();
         display.say(message.text, "refused");
         break;
       case "program":
+        pictures.forget();
         display.say(`loaded ${message.name}`, "");
         break;
       case "picture":
-        seen[message.of] = message.number;
         pictures.fetch(message.of, message.number).catch((error) => complain(`The picture can not be shown: ${error.message}`));
         break;
     }
   }
 
-  return { display, controls, link, pictures, seen };
+  return { display, controls, link, pictures };
 }
 
 try {

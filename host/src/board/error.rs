@@ -7,9 +7,8 @@ use motion_kernel::link::{Identity, PROTOCOL, PushError, WriteError};
 use motion_kernel::program::ProgramError;
 use thiserror::Error;
 
-use super::operated::CAPTURE_MAX;
 use super::scope::ScopeError;
-use super::trigger::Condition;
+use super::trigger::{CAPTURE_MAX, Condition};
 use crate::simulate::RunError;
 use crate::simulate::jog::JogError;
 
@@ -171,7 +170,7 @@ pub enum BoardError {
     #[error("found the trigger {0}, expected an axis of the machine")]
     Trigger(Condition),
     /// Too many ticks are to be captured.
-    #[error("found {ticks} ticks to capture, expected less than {CAPTURE_MAX}")]
+    #[error("found {ticks} ticks to capture, expected at most {CAPTURE_MAX}")]
     Capture {
         /// How many were asked for.
         ticks: usize,

@@ -154,6 +154,8 @@ pub struct BoardState {
     pub state: Option<State>,
     /// What this side has under way.
     pub under_way: UnderWay,
+    /// The board holds a program that another start of this side, or somebody else, has begun; [`Board::abort`] gives it up.
+    pub is_foreign: bool,
     /// Set position of each axis \[mm, °\].
     pub set_mm: Vec<f64>,
     /// Actual position of each axis \[mm, °\].
@@ -202,7 +204,14 @@ pub enum BoardEvent {
     /// It has ended for this reason.
     Failed(UnderWay, BoardError),
     /// There is something for [`Board::take_capture`].
-    Captured,
+    Captured {
+        /// Ticks in between that are missing.
+        missing: u64,
+    },
+    /// Ticks are not told any more: one differed.
+    ScopeFailed(String),
+    /// Somebody else has asked the board since: it obeys this side no more.
+    Replaced,
 }
 
 /// The word for a state.
@@ -226,7 +235,7 @@ fn as_words<S: serde::Serializer>(state: &Option<State>, to: S) -> Result<S::Ok,
     state.map(state_words).serialize(to)
 }
 
-/// Steps until `is_it` says so of an event, for at most `limit`; the event, if there was one.
+/// Steps until `is_it`, which sees every event, says so of one, for at most `limit`; the first such event, if there was one.
 pub fn wait_for(
     board: &mut dyn Board,
     limit: Duration,
@@ -234,7 +243,9 @@ pub fn wait_for(
 ) -> Option<BoardEvent> {
     let begin = Instant::now();
     while begin.elapsed() < limit {
-        if let Some(event) = board.step(Duration::from_millis(5)).into_iter().find(|event| is_it(event)) {
+        // All of them are looked at.
+        let events = board.step(Duration::from_millis(5)).into_iter().filter(|event| is_it(event));
+        if let Some(event) = events.collect::<Vec<_>>().into_iter().next() {
             return Some(event);
         }
     }

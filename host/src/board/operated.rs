@@ -22,17 +22,15 @@ use super::scope::{Scope, Ticks};
 use super::sender::{Permissions, Sender, Step, check, check_outputs};
 use super::simulator::{self, SimulatedBoard};
 use super::stops::Stops;
-use super::trigger::{Around, Condition};
+use super::trigger::{Around, CAPTURE_MAX, Condition};
 use super::wire::Wire;
 use crate::gcode::{self, AXES_MAX};
 use crate::machine::Machine;
 use crate::planning::{Executable, Mode as PlanMode, on_axis_count, plan_program, require_outputs};
 use crate::simulate::jog::{Keys, Press, WantedJog};
+use crate::simulate::session::jog_axis;
 use crate::simulate::{RunInfo, faults};
 use crate::trace::{AxisTick, RunTrace, TraceRow};
-
-/// Most ticks of a capture: five minutes at 2 kHz.
-pub const CAPTURE_MAX: usize = 600_000;
 
 /// After so long a silence of this side the board holds a jog \[ms\].
 const DEAD_MAN_MS: u16 = 500;
@@ -106,6 +104,7 @@ impl<const M: usize> Work<M> {
 struct Capture<const M: usize> {
     wanted: Option<Wanted<M>>,
     rows: Vec<TraceRow<M>>,
+    missing: u64,
     is_over: bool,
 }
 
@@ -117,7 +116,7 @@ enum Wanted<const M: usize> {
 
 impl<const M: usize> Capture<M> {
     fn add(&mut self, row: &TraceRow<M>) {
-        let Self { wanted, rows, is_over } = self;
+        let Self { wanted, rows, is_over, .. } = self;
         *is_over = match wanted {
             None => return,
             Some(Wanted::Around(around)) => {
@@ -176,7 +175,7 @@ impl<R: Root + Send, const N: usize, const M: usize> Operated<R, N, M> {
             name: axis.name.clone(),
             unit: axis.unit().symbol(),
             travel_mm: travel[place].map(|ends| ends.map(Position::to_mm)),
-            feed_mm_s: axis.feed_mm_s,
+            feed_mm_s: jog_axis(machine, place).feed_mm_s,
         });
         let info = BoardInfo {
             machine: machine.name.clone(),
@@ -289,10 +288,13 @@ impl<R: Root + Send, const N: usize, const M: usize> Board for Operated<R, N, M>
         };
         let name = |axis: usize| self.axes.get(axis).cloned().unwrap_or_else(|| format!("axis {axis}"));
         let is_driven = matches!(self.work, Some(Work::Program(_)));
+        let is_at_end = status.state == State::Idle && status.is_ended;
+        let is_begun = controls.program != 0 && status.taken > 0 && !is_at_end;
         let items = self.program.as_ref().filter(|_| is_driven).map(|program| program.job.items.len());
         BoardState {
             tick: status.tick,
             state: Some(status.state),
+            is_foreign: self.work.is_none() && is_begun,
             set_mm: mm(&status.set),
             actual_mm: mm(&status.actual),
             feed_mm_s: status.feed_mm_s,
@@ -309,6 +311,7 @@ impl<R: Root + Send, const N: usize, const M: usize> Board for Operated<R, N, M>
         let (mut heard, mut events) = (Vec::new(), Vec::new());
         self.connection.step(wait, &mut |one| heard.push(one));
         for one in heard {
+            // That somebody else has the board is told by itself.
             if let Some(work) = &mut self.work
                 && let Err(error) = work.sender().hear(&one)
             {
@@ -318,6 +321,7 @@ impl<R: Root + Send, const N: usize, const M: usize> Board for Operated<R, N, M>
             match one {
                 Heard::Lost(cause) => events.push(BoardEvent::Lost(cause)),
                 Heard::Back => events.push(BoardEvent::Back),
+                Heard::Board(Event::Replaced) => events.push(BoardEvent::Replaced),
                 Heard::Board(Event::Restarted { .. }) => {
                     self.connection.accept();
                     events.push(BoardEvent::Restarted);
@@ -328,8 +332,17 @@ impl<R: Root + Send, const N: usize, const M: usize> Board for Operated<R, N, M>
         self.take_planned(&mut events);
         self.advance(&mut events);
         self.tell_stop(&mut events);
-        if take(&mut lock(&self.capture).is_over) {
-            events.push(BoardEvent::Captured);
+        {
+            let mut capture = lock(&self.capture);
+            if take(&mut capture.is_over) {
+                events.push(BoardEvent::Captured { missing: capture.missing });
+            }
+        }
+        if self.connection.scope().is_some_and(Scope::has_failed)
+            && let Some(error) = self.connection.end_scope().and_then(|summary| summary.error)
+        {
+            lock(&self.capture).wanted = None;
+            events.push(BoardEvent::ScopeFailed(error.to_string()));
         }
         events
     }
@@ -457,8 +470,11 @@ impl<R: Root + Send, const N: usize, const M: usize> Board for Operated<R, N, M>
         let identity = self.connection.identity().copied().ok_or(BoardError::Silent)?;
         let capture = Arc::clone(&self.capture);
         let sink = Box::new(move |told: Ticks<'_, M>| {
-            if let Ticks::Row(row) = told {
-                lock(&capture).add(row);
+            let mut capture = lock(&capture);
+            match told {
+                Ticks::Row(row) => capture.add(row),
+                Ticks::Gap(first, last) if !capture.rows.is_empty() => capture.missing += last - first + 1,
+                Ticks::Gap(..) => {}
             }
         });
         self.connection.set_scope(Scope::start(&identity, &record, sink)?);
@@ -470,15 +486,16 @@ impl<R: Root + Send, const N: usize, const M: usize> Board for Operated<R, N, M>
         if let Some(trigger) = trigger.as_ref().filter(|trigger| !trigger.suits(&names)) {
             return Err(BoardError::Trigger(trigger.clone()));
         }
-        if before + after >= CAPTURE_MAX {
-            return Err(BoardError::Capture { ticks: before + after });
+        let ticks = before.saturating_add(after);
+        if ticks > CAPTURE_MAX {
+            return Err(BoardError::Capture { ticks });
         }
         self.watch_ticks()?;
         let wanted = match trigger {
             Some(trigger) => Wanted::Around(Around::new(trigger, names, before, after)),
             None => Wanted::Next(after.max(1)),
         };
-        *lock(&self.capture) = Capture { wanted: Some(wanted), rows: Vec::new(), is_over: false };
+        *lock(&self.capture) = Capture { wanted: Some(wanted), ..Capture::default() };
         Ok(())
     }
 

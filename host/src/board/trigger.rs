@@ -8,6 +8,9 @@ use crate::simulate::run::state_names;
 use crate::trace::TraceRow;
 use crate::trace::columns::AXIS_COLUMNS;
 
+/// Most ticks that are kept in memory: a minute at 2 kHz.
+pub const CAPTURE_MAX: usize = 120_000;
+
 /// A condition of a tick. Displays as the text it is read from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Condition {

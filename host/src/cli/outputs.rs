@@ -12,6 +12,7 @@ use crate::files::{Failure, Files, FilesError, OutputFile};
 use crate::planning::Plan;
 use crate::report::{self, PageRun};
 use crate::simulate::{Job, Observer, RunError, RunInfo, RunSummary};
+use crate::trace::mcap::McapTicks;
 use crate::trace::{RunTrace, TraceRow, TracedProgram};
 
 /// Opens the file of an option, if it is given.
@@ -29,6 +30,8 @@ pub(super) fn open(
 pub(super) struct Written {
     files: Vec<(&'static str, String)>,
     failures: Vec<FilesError>,
+    /// The trace has no tick: what it was to begin with has not come.
+    has_no_tick: bool,
     /// Why a trace did not get to standard output.
     printed: Option<io::Error>,
 }
@@ -65,6 +68,10 @@ impl Written {
         for (what, name) in &self.files {
             writeln!(out, "  {what} written to {name}").map_err(CliError::Output)?;
         }
+        if self.has_no_tick {
+            let note = "  note: the trace has no tick, because what --from names has not come";
+            writeln!(out, "{note}").map_err(CliError::Output)?;
+        }
         Ok(())
     }
 
@@ -81,6 +88,7 @@ pub(super) struct Outputs {
     trace: Option<TraceOutput>,
     /// What of it.
     of_trace: TraceArguments,
+    mcap: Option<OutputFile>,
     report: Option<OutputFile>,
     /// What the report shows of the program.
     program: Option<TracedProgram>,
@@ -137,8 +145,9 @@ impl Outputs {
         } else {
             open(files, "--trace", of_trace.trace.as_ref())?.map(TraceOutput::File)
         };
+        let mcap = open(files, "--mcap", of_trace.mcap.as_ref())?;
         let report = open(files, "--report", report)?;
-        Ok(Self { trace, of_trace: of_trace.clone(), report, program: None, against: None })
+        Ok(Self { trace, of_trace: of_trace.clone(), mcap, report, program: None, against: None })
     }
 
     /// Where the rest of a command's output goes: to standard error, where the trace has standard output.
@@ -152,7 +161,7 @@ impl Outputs {
     /// Only the report; `role` names its option.
     pub(super) fn report(files: &mut Files, role: &'static str, path: PathBuf) -> Result<Self, FilesError> {
         let (of_trace, report) = (TraceArguments::default(), open(files, role, Some(&path))?);
-        Ok(Self { trace: None, of_trace, report, program: None, against: None })
+        Ok(Self { trace: None, of_trace, mcap: None, report, program: None, against: None })
     }
 
     /// With the program's text, and where the time of its plan goes.
@@ -213,7 +222,12 @@ impl Outputs {
             };
             (named, TraceWriter::new(output, info, selection))
         });
-        let mut ticks = Ticks { trace, report: self.report, against: self.against, ticks: Vec::new() };
+        let mcap = self.mcap.map(|file| {
+            let named = (file.name().to_owned(), file.failure());
+            (named, McapTicks::new(file, info))
+        });
+        let (report, against) = (self.report, self.against);
+        let mut ticks = Ticks { trace, mcap, report, against, ticks: Vec::new() };
         let ran = run(&mut |tick| ticks.add(tick));
         Ok((ran, ticks))
     }
@@ -226,6 +240,7 @@ type TraceFile = (String, Failure);
 pub(super) struct Ticks<const N: usize> {
     /// With the file that it is written to, if it is.
     trace: Option<(Option<TraceFile>, TraceWriter<TraceOutput>)>,
+    mcap: Option<(TraceFile, io::Result<McapTicks<OutputFile, N>>)>,
     report: Option<OutputFile>,
     against: Option<PageRun>,
     ticks: Vec<TraceRow<N>>,
@@ -236,6 +251,9 @@ impl<const N: usize> Ticks<N> {
         if let Some((_, trace)) = &mut self.trace {
             trace.add(tick);
         }
+        if let Some((_, Ok(mcap))) = &mut self.mcap {
+            mcap.add(tick);
+        }
         if self.report.is_some() {
             self.ticks.push(*tick);
         }
@@ -245,6 +263,7 @@ impl<const N: usize> Ticks<N> {
     pub(super) fn write(self, trace: impl FnOnce(Vec<TraceRow<N>>) -> RunTrace<N>) -> Written {
         let mut written = Written::default();
         if let Some((named, writer)) = self.trace {
+            written.has_no_tick = writer.has_not_begun();
             match (named, writer.finish()) {
                 (Some((name, failure)), done) => {
                     let done = done.map_err(|source| failure.of(source));
@@ -253,6 +272,10 @@ impl<const N: usize> Ticks<N> {
                 (None, Ok(mut out)) => written.printed = out.flush().err(),
                 (None, Err(source)) => written.printed = Some(source),
             }
+        }
+        if let Some(((name, failure), begun)) = self.mcap {
+            let done = begun.and_then(McapTicks::finish).map_err(|source| failure.of(source));
+            written.add("MCAP", name, done.and_then(OutputFile::commit));
         }
         let (ticks, against) = (self.ticks, self.against);
         written

@@ -20,7 +20,7 @@ Examples:
   motion panel                                       the simulated machine, at http://127.0.0.1:5080/
   motion panel --port /dev/ttyACM0 --machine mine.toml
                                                      a board at a serial port
-  motion panel --listen 0.0.0.0:5080 --token 71kx    for a tablet in the workshop: http://HOST:5080/?token=71kx
+  motion panel --listen 0.0.0.0:5080 --token Kd93mWq7xT2b   for a tablet in the workshop: http://HOST:5080/?token=Kd93mWq7xT2b
 
 The page loads a program, starts, holds, resumes and aborts it, sets the override, jogs the axes, and keeps ticks around a
 trigger. Several tabs see the same; one commands, any may hold and abort. A jog ends when its key, its tab or this command is gone.
@@ -46,10 +46,13 @@ pub struct PanelArguments {
     token: Option<String>,
 }
 
+/// The shortest token: nobody guesses it.
+const TOKEN_LEAST: usize = 12;
+
 /// A word that an address may have.
 fn token(text: &str) -> Result<String, String> {
-    if text.is_empty() || !text.bytes().all(|byte| byte.is_ascii_alphanumeric()) {
-        return Err(format!("found `{text}`, expected letters and digits"));
+    if text.len() < TOKEN_LEAST || !text.bytes().all(|byte| byte.is_ascii_alphanumeric()) {
+        return Err(format!("found `{text}`, expected at least {TOKEN_LEAST} letters and digits"));
     }
     Ok(text.to_owned())
 }
@@ -85,7 +88,10 @@ fn panel<const N: usize>(
         .map_err(CliError::Output)?;
     interrupt::hold_first();
     let access = Access { token: arguments.token.clone() };
-    serve(listener, &desk, access, &mut || interrupt::take_asked().is_some()).map_err(refused)?;
+    let served = serve(listener, &desk, access, &mut || interrupt::take_asked().is_some());
+    let has_failed = desk.has_ended();
     desk.end();
-    Ok(Outcome::Done)
+    served.map_err(refused)?;
+    // A thread that has panicked has said so.
+    Ok(if has_failed { Outcome::Failed } else { Outcome::Done })
 }

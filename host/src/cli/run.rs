@@ -23,7 +23,7 @@ use crate::planning::{Mode, Plan, plan_program};
 use crate::recording::Recorder;
 use crate::simulate::inject::Injections;
 use crate::simulate::live::Script;
-use crate::simulate::{self, AxisSummary, Job, Probed, RunError, RunOptions, RunSummary};
+use crate::simulate::{self, AxisSummary, Job, Probed, RunError, RunInfo, RunOptions, RunSummary};
 use crate::trace::{RunEnd, TracedCommand, TracedFault, TracedSwitch};
 
 const EXAMPLES: &str = "\
@@ -120,6 +120,8 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
     let kept = arguments.reading.parameters.as_ref();
     let kept = kept.map(|path| files.edited("--parameters", path, "--parameters")).transpose()?;
     let machine = input::any_machine(arguments.machine.as_ref())?;
+    // A wrong column is not found after a long plan.
+    on_machine!(machine, machine => arguments.trace.selection(&RunInfo::of_machine(machine)))?;
     let source = input::read(&arguments.program)?;
     let reading = arguments.reading.options(machine.read_options())?;
     let program = source.program(&reading)?;

@@ -54,6 +54,10 @@ pub(super) struct TraceArguments {
     /// is then printed to standard error.
     #[arg(long, value_name = "FILE.csv")]
     pub(super) trace: Option<PathBuf>,
+    /// Write every quantity of every tick as MCAP, for viewers such as Foxglove and PlotJuggler; an existing file is
+    /// replaced.
+    #[arg(long, value_name = "FILE.mcap")]
+    pub(super) mcap: Option<PathBuf>,
     /// Columns of --trace in their order, by name, such as `t_s,X_err_um`. Without it, all.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "trace")]
     columns: Vec<String>,
@@ -100,8 +104,21 @@ impl TraceArguments {
             self.columns.iter().map(named).collect::<Result<_, _>>()?
         };
         let due = |when: Option<When>| when.map(|when| when.due(info));
+        let (from, to) = (due(self.from), due(self.to));
+        let is_behind = match (from, to) {
+            (Some(Due::Tick(from)), Some(Due::Tick(to))) => from > to,
+            (Some(Due::Position(from_mm)), Some(Due::Position(to_mm))) => from_mm > to_mm,
+            _ => false,
+        };
+        if is_behind {
+            let found = "--from behind --to".to_owned();
+            return Err(CliError::Arguments {
+                found,
+                expected: "a first tick that is not behind the last one",
+            });
+        }
         let every = self.every.map_or(1, NonZeroU64::get);
-        let ticks = Ticks { from: due(self.from), to: due(self.to), every, ..Ticks::ALL };
+        let ticks = Ticks { from, to, every, ..Ticks::ALL };
         Ok(Selection { columns, ticks })
     }
 }
@@ -183,6 +200,11 @@ impl<W: Write> TraceWriter<W> {
         if self.failure.is_none() && self.selection.ticks.takes(tick.tick, tick.s_mm) {
             self.failure = self.row(tick).err();
         }
+    }
+
+    /// Whether the tick that it was to begin with has not come.
+    pub(super) fn has_not_begun(&self) -> bool {
+        self.selection.ticks.from.is_some() && self.selection.ticks.first.is_none()
     }
 
     /// Writes out what is still in memory; returns what it was written to.

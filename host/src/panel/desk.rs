@@ -3,13 +3,13 @@
 //! Consumes the tabs' commands and what the board tells; produces what every tab is told. Tabs that do not listen are left out:
 //! the board waits for none.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use super::message::{Command, Commander, PictureOf, Told};
+use super::message::{Command, Commander, PictureOf, Said, Told};
 use crate::board::BoardError;
 use crate::board::interface::{Board, BoardEvent, BoardState, UnderWay};
 use crate::board::items::Source;
@@ -24,6 +24,10 @@ pub const KEY_SILENCE: Duration = Duration::from_millis(400);
 const STEP: Duration = Duration::from_millis(4);
 /// The longest time for a board to confirm the last hold.
 const FAREWELL: Duration = Duration::from_secs(1);
+/// A command that may move something is refused where the tab has heard no state for this time: what it sees is over.
+const STALE: Duration = Duration::from_millis(2500);
+/// Orders that are obeyed between two steps of the board.
+const ORDERS: usize = 64;
 /// Between two tellings of the state.
 const STATE_EVERY: Duration = Duration::from_millis(40);
 
@@ -37,7 +41,7 @@ pub enum Order {
     /// It has gone.
     Left(Tab),
     /// It commands.
-    Command(Tab, Command),
+    Command(Tab, Said),
     /// The panel ends: the machine is held.
     End,
 }
@@ -68,8 +72,12 @@ impl Pictures {
     }
 }
 
-/// Makes the picture of a program as it would be driven; none where it would take too long.
-pub type MakePicture = Arc<dyn Fn(&Source) -> Option<PageRun> + Send + Sync>;
+/// Makes the picture of a program as it would be driven, or says why not.
+pub type MakePicture = Arc<dyn Fn(&Source) -> Result<PageRun, String> + Send + Sync>;
+
+/// Places of pictures, by what they are of.
+const PROGRAM: usize = PictureOf::Program as usize;
+const TICKS: usize = PictureOf::Capture as usize;
 
 /// The desk.
 pub struct Desk {
@@ -87,7 +95,7 @@ impl Desk {
         let kept = pictures.clone();
         let thread = thread::Builder::new()
             .name("desk".to_owned())
-            .spawn(move || Work::new(board, options, make_picture, kept).run(&asked))
+            .spawn(move || Session::new(board, options, make_picture, kept).run(&asked))
             .expect("a system that has threads");
         Self { orders, pictures, thread }
     }
@@ -97,6 +105,12 @@ impl Desk {
         // A thread that has panicked has said so.
         let _ = self.orders.send(Order::End);
         let _ = self.thread.join();
+    }
+
+    /// Whether it has ended, which without [`Self::end`] only a panic is.
+    #[must_use]
+    pub fn has_ended(&self) -> bool {
+        self.thread.is_finished()
     }
 
     /// Where orders are given. The desk ends when nobody can give any.
@@ -112,7 +126,8 @@ impl Desk {
     }
 }
 
-struct Work {
+/// The board, and everybody who looks at it.
+struct Session {
     board: Box<dyn Board>,
     options: ReadOptions,
     make_picture: MakePicture,
@@ -125,14 +140,26 @@ struct Work {
     asked: Option<Arc<Source>>,
     /// The one that is loaded.
     loaded: Option<Arc<Source>>,
-    /// A picture of it, on its way.
-    picture: Option<Receiver<Option<PageRun>>>,
-    /// The last one of the program, and of ticks.
+    /// Pictures on their way, of the program and of ticks; one of each at a time.
+    drawing: [Option<Drawing>; 2],
+    /// The program whose picture comes next.
+    to_draw: Option<Arc<Source>>,
+    /// The last pictures.
     shown: [Option<u64>; 2],
-    numbers: u64,
+    pictures_made: u64,
+    /// States that were told, and when the latest of them were.
+    states: u64,
+    told: VecDeque<(u64, Instant)>,
 }
 
-impl Work {
+/// A picture on its way.
+struct Drawing {
+    /// Of this program.
+    of: Option<Arc<Source>>,
+    picture: Receiver<Result<PageRun, String>>,
+}
+
+impl Session {
     fn new(
         board: Box<dyn Board>,
         options: ReadOptions,
@@ -149,9 +176,12 @@ impl Work {
             key: None,
             asked: None,
             loaded: None,
-            picture: None,
+            drawing: [None, None],
+            to_draw: None,
             shown: [None, None],
-            numbers: 0,
+            pictures_made: 0,
+            states: 0,
+            told: VecDeque::new(),
         }
     }
 
@@ -161,7 +191,7 @@ impl Work {
             for event in self.board.step(STEP) {
                 self.happened(event);
             }
-            loop {
+            for _ in 0..ORDERS {
                 match orders.try_recv() {
                     Ok(Order::End) | Err(TryRecvError::Disconnected) => return self.end(),
                     Ok(order) => self.obey(order),
@@ -171,7 +201,7 @@ impl Work {
             if self.key.is_some_and(|kept| kept.elapsed() > KEY_SILENCE) {
                 self.release();
             }
-            self.take_picture();
+            self.take_pictures();
             if told.elapsed() >= STATE_EVERY {
                 told = Instant::now();
                 let state = self.board.state();
@@ -206,8 +236,8 @@ impl Work {
                 self.welcome(tab);
             }
             Order::Left(tab) => self.leave(tab),
-            Order::Command(tab, command) => {
-                if let Err(refused) = self.command(tab, command) {
+            Order::Command(tab, said) => {
+                if let Err(refused) = self.command(tab, said) {
                     self.tell(tab, &Told::Refused { text: &refused });
                 }
             }
@@ -219,8 +249,7 @@ impl Work {
         let info = self.board.info().clone();
         self.tell(tab, &Told::Board { board: &info });
         if let Some(source) = self.loaded.clone() {
-            let text = String::from_utf8_lossy(&source.text);
-            self.tell(tab, &Told::Program { name: &source.name, text: &text });
+            self.tell(tab, &Told::Program { name: &source.name });
         }
         for (of, number) in [PictureOf::Program, PictureOf::Capture].into_iter().zip(self.shown) {
             if let Some(number) = number {
@@ -244,11 +273,13 @@ impl Work {
         self.board.release_key();
     }
 
-    fn command(&mut self, tab: Tab, command: Command) -> Result<(), String> {
+    fn command(&mut self, tab: Tab, Said { heard, command }: Said) -> Result<(), String> {
         if !command.is_for_all() && *self.commander.get_or_insert(tab) != tab {
             return Err("another tab commands; take the command first".to_owned());
         }
-        let words = |error: BoardError| error.to_string();
+        if command.may_move() && self.is_stale(heard) {
+            return Err("the command came too late: look at the machine, and give it again".to_owned());
+        }
         match command {
             Command::Take => {
                 if self.commander != Some(tab) {
@@ -266,21 +297,23 @@ impl Work {
                     options: self.options.clone(),
                     leaves_out_outputs: false,
                 };
-                self.board.load(source.clone()).map_err(words)?;
-                (self.asked, self.loaded, self.picture) = (Some(Arc::new(source)), None, None);
-                self.shown = [None, self.shown[1]];
+                self.board.load(source.clone()).map_err(|error| words(&error))?;
+                (self.asked, self.loaded, self.to_draw) = (Some(Arc::new(source)), None, None);
+                self.shown[PROGRAM] = None;
             }
-            Command::Start => self.board.start().map_err(words)?,
+            Command::Start => self.board.start().map_err(|error| words(&error))?,
             Command::Hold => self.board.hold(),
-            Command::Resume => self.board.resume().map_err(words)?,
+            Command::Resume => self.board.resume().map_err(|error| words(&error))?,
             Command::Abort => self.board.abort(),
-            Command::Override { permille } => self.board.set_override(permille).map_err(words)?,
+            Command::Override { permille } => {
+                self.board.set_override(permille).map_err(|error| words(&error))?
+            }
             Command::SingleBlock { is_on } => self.board.set_single_block(is_on),
-            Command::Drives { are_on } => self.board.set_drives(are_on).map_err(words)?,
+            Command::Drives { are_on } => self.board.set_drives(are_on).map_err(|error| words(&error))?,
             Command::ClearFault => self.board.clear_fault(),
             Command::Press { key, feed_mm_s, is_held } => {
                 let press: Press = key.parse().map_err(|error| format!("{error}"))?;
-                self.board.press_key(&press, feed_mm_s).map_err(words)?;
+                self.board.press_key(&press, feed_mm_s).map_err(|error| words(&error))?;
                 self.key = is_held.then(Instant::now);
             }
             Command::Keep => {
@@ -291,7 +324,7 @@ impl Work {
             Command::Release => self.release(),
             Command::Capture { trigger, before, after } => {
                 let trigger = trigger.map(|text| text.parse::<Condition>()).transpose()?;
-                self.board.capture(trigger, before, after).map_err(words)?;
+                self.board.capture(trigger, before, after).map_err(|error| words(&error))?;
             }
         }
         Ok(())
@@ -303,23 +336,27 @@ impl Work {
             BoardEvent::Lost(cause) => {
                 (format!("lost the board: {cause}; it comes to rest on the path"), true)
             }
-            BoardEvent::Back => ("the board is back, and is held: resume goes on".to_owned(), false),
+            BoardEvent::Back => ("the board is back, and is held".to_owned(), false),
+            BoardEvent::Replaced => (
+                "somebody else has asked the board since: start this panel anew to command it".to_owned(),
+                true,
+            ),
             BoardEvent::Restarted => ("the board has started anew".to_owned(), true),
             BoardEvent::Loaded(notes) => {
                 self.loaded = self.asked.take();
                 if let Some(source) = self.loaded.clone() {
-                    let text = String::from_utf8_lossy(&source.text);
-                    self.tell_all(&Told::Program { name: &source.name, text: &text }, true);
-                    self.begin_picture(source);
+                    self.tell_all(&Told::Program { name: &source.name }, true);
+                    self.to_draw = Some(source);
                 }
-                for note in notes {
-                    self.tell_all(&Told::Event { text: &format!("note: {note}"), is_failure: false }, true);
+                if notes.is_empty() {
+                    return;
                 }
-                return;
+                // One message: tabs have room for some.
+                (notes.join("; "), false)
             }
             BoardEvent::NotLoaded(error) => {
                 self.asked = None;
-                (error.to_string(), true)
+                (words(&error), true)
             }
             BoardEvent::Stopped(text) => (text, false),
             BoardEvent::Done(UnderWay::Program) => ("the program is done".to_owned(), false),
@@ -331,66 +368,83 @@ impl Work {
             }
             BoardEvent::Failed(under_way, error) => {
                 self.key = None;
-                (format!("{}: {error}", what(under_way)), true)
+                (format!("{}: {}", what(under_way), words(&error)), true)
             }
-            BoardEvent::Captured => {
-                if let Some(trace) = self.board.take_capture() {
-                    let count = trace.ticks.len();
-                    match PageRun::of(&trace) {
-                        Ok(picture) => self.show(PictureOf::Capture, picture),
-                        Err(error) => {
-                            self.tell_all(&Told::Event { text: &error.to_string(), is_failure: true }, true);
-                        }
-                    }
-                    (format!("captured {count} ticks"), false)
-                } else {
-                    return;
-                }
+            BoardEvent::Captured { missing } => {
+                let Some(trace) = self.board.take_capture() else { return };
+                let count = trace.ticks.len();
+                self.drawing[TICKS] =
+                    Some(draw(None, move || PageRun::of(&trace).map_err(|error| error.to_string())));
+                let missing =
+                    if missing > 0 { format!("; {missing} in between are missing") } else { String::new() };
+                (format!("captured {count} ticks{missing}"), missing.is_empty())
             }
+            BoardEvent::ScopeFailed(error) => (format!("scope: {error}"), true),
         };
         self.tell_all(&Told::Event { text: &text, is_failure }, true);
     }
 
-    /// The picture of a program is made beside everything else.
-    fn begin_picture(&mut self, source: Arc<Source>) {
-        let (to, picture) = channel();
-        let make = Arc::clone(&self.make_picture);
-        self.picture = Some(picture);
-        thread::spawn(move || {
-            // Nobody wants it where another program was loaded meanwhile.
-            let _ = to.send(make(&source));
-        });
-    }
-
-    fn take_picture(&mut self) {
-        let Some(picture) = &self.picture else { return };
-        match picture.try_recv() {
-            Ok(Some(picture)) => self.show(PictureOf::Program, picture),
-            Err(TryRecvError::Empty) => return,
-            Ok(None) | Err(_) => {
-                let text = "the program is too long for a picture";
-                self.tell_all(&Told::Event { text, is_failure: false }, true);
+    /// Shows what is drawn, and begins with the next program.
+    fn take_pictures(&mut self) {
+        for of in [PictureOf::Program, PictureOf::Capture] {
+            let Some(drawing) = &self.drawing[of as usize] else { continue };
+            let picture = match drawing.picture.try_recv() {
+                Ok(picture) => picture,
+                Err(TryRecvError::Empty) => continue,
+                Err(TryRecvError::Disconnected) => Err("a picture is not there".to_owned()),
+            };
+            // Of another program than the one that is loaded now, nobody wants it.
+            let is_wanted = match (&drawing.of, &self.loaded) {
+                (Some(of), Some(loaded)) => Arc::ptr_eq(of, loaded),
+                (Some(_), None) => false,
+                (None, _) => true,
+            };
+            self.drawing[of as usize] = None;
+            match picture {
+                Ok(picture) if is_wanted => self.show(of, picture),
+                Err(text) if is_wanted => {
+                    self.tell_all(&Told::Event { text: &text, is_failure: false }, true)
+                }
+                _ => {}
             }
         }
-        self.picture = None;
+        if self.drawing[PROGRAM].is_none()
+            && let Some(source) = self.to_draw.take()
+        {
+            let (make, of) = (Arc::clone(&self.make_picture), Arc::clone(&source));
+            self.drawing[PROGRAM] = Some(draw(Some(of), move || make(&source)));
+        }
     }
 
     fn show(&mut self, of: PictureOf, picture: PageRun) {
-        self.numbers += 1;
-        self.pictures.put(self.numbers, picture);
-        self.shown[usize::from(of == PictureOf::Capture)] = Some(self.numbers);
-        self.tell_all(&Told::Picture { of, number: self.numbers }, true);
+        self.pictures_made += 1;
+        let number = self.pictures_made;
+        self.pictures.put(number, picture);
+        self.shown[of as usize] = Some(number);
+        self.tell_all(&Told::Picture { of, number }, true);
+    }
+
+    /// Whether the state of this number is over.
+    fn is_stale(&self, heard: u64) -> bool {
+        let told = self.told.iter().find(|(number, _)| *number == heard);
+        told.is_none_or(|(_, at)| at.elapsed() > STALE)
     }
 
     fn tell_state(&mut self, state: &BoardState) {
         let commander = self.commander;
+        self.states += 1;
+        let number = self.states;
+        self.told.push_back((number, Instant::now()));
+        while self.told.front().is_some_and(|(_, at)| at.elapsed() > 2 * STALE) {
+            self.told.pop_front();
+        }
         self.say(&mut |tab| {
             let commander = match commander {
                 Some(other) if other == tab => Commander::You,
                 Some(_) => Commander::Another,
                 None => Commander::Nobody,
             };
-            (to_text(&Told::State { state, commander }), false)
+            (to_text(&Told::State { number, state, commander }), false)
         });
     }
 
@@ -421,4 +475,25 @@ impl Work {
 
 fn to_text(told: &Told<'_>) -> String {
     serde_json::to_string(told).expect("texts and numbers")
+}
+
+/// Draws a picture beside everything else.
+fn draw(of: Option<Arc<Source>>, make: impl FnOnce() -> Result<PageRun, String> + Send + 'static) -> Drawing {
+    let (to, picture) = channel();
+    thread::spawn(move || {
+        // Nobody waits for it where the desk has ended.
+        let _ = to.send(make());
+    });
+    Drawing { of, picture }
+}
+
+/// An error in an operator's words: those of `motion send` name its options.
+fn words(error: &BoardError) -> String {
+    match error {
+        BoardError::Off => "found the drives off, expected them on".to_owned(),
+        BoardError::Begun { .. } | BoardError::Busy => {
+            "found a board that has a program under way, expected none: abort gives it up".to_owned()
+        }
+        other => other.to_string(),
+    }
 }

@@ -4,7 +4,17 @@ use serde::{Deserialize, Serialize};
 
 use crate::board::interface::{BoardInfo, BoardState};
 
-/// From a tab.
+/// From a tab: a command, and the state that it was given at.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Said {
+    /// The number of the state that the tab has heard last.
+    pub heard: u64,
+    /// What it wants.
+    pub command: Command,
+}
+
+/// What a tab wants.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(tag = "do", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Command {
@@ -70,7 +80,22 @@ impl Command {
     /// Whether a tab may say so that does not command.
     #[must_use]
     pub fn is_for_all(&self) -> bool {
-        matches!(self, Self::Take | Self::Hold | Self::Abort | Self::Release | Self::Drives { are_on: false })
+        matches!(
+            self,
+            Self::Take
+                | Self::Hold
+                | Self::Abort
+                | Self::Release
+                // Of a key that was refused, or taken away: nothing is to be said about it.
+                | Self::Keep
+                | Self::Drives { are_on: false }
+        )
+    }
+
+    /// Whether something may move by it: it is not to come late.
+    #[must_use]
+    pub fn may_move(&self) -> bool {
+        matches!(self, Self::Start | Self::Resume | Self::Press { .. } | Self::Drives { are_on: true })
     }
 }
 
@@ -85,6 +110,8 @@ pub enum Told<'t> {
     },
     /// What the board does.
     State {
+        /// Counts the states that were told.
+        number: u64,
         /// It.
         state: &'t BoardState,
         /// Who commands: this tab, another, or nobody.
@@ -106,8 +133,6 @@ pub enum Told<'t> {
     Program {
         /// Its name.
         name: &'t str,
-        /// Its text.
-        text: &'t str,
     },
     /// There is a picture of this number, to be fetched: of the program as it would be driven, or of ticks that were captured.
     Picture {

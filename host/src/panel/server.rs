@@ -20,11 +20,13 @@ use axum::routing::get;
 use tokio::sync::mpsc::{Receiver, channel};
 
 use super::desk::{Desk, Order, Pictures, Tab};
-use super::message::{Command, Told};
+use super::message::{Said, Told};
 use crate::report::{PageRun, panel_page};
 
 /// Texts that wait for a tab; half of them are for those that it needs.
 const WAITING: usize = 64;
+/// A tab that takes longer for a message has gone.
+const SLOWEST: Duration = Duration::from_secs(2);
 /// The longest program that a tab may load \[bytes\].
 const PROGRAM_MAX: usize = 64 << 20;
 
@@ -90,7 +92,7 @@ pub fn serve(
     runtime.block_on(async move {
         let listener = tokio::net::TcpListener::from_std(listener)?;
         let over = async {
-            while !is_over() {
+            while !is_over() && !desk.has_ended() {
                 tokio::time::sleep(Duration::from_millis(100)).await;
             }
         };
@@ -170,13 +172,13 @@ async fn attend(mut socket: WebSocket, tab: Tab, orders: &Sender<Order>) {
     }
     while let Some(step) = next_step(&mut socket, &mut told).await {
         let is_taken = match step {
-            Step::Tell(text) => socket.send(Message::text(text)).await.is_ok(),
-            Step::Heard(text) => match serde_json::from_str::<Command>(&text) {
-                Ok(command) => orders.send(Order::Command(tab, command)).is_ok(),
+            Step::Tell(text) => tell(&mut socket, text).await,
+            Step::Heard(text) => match serde_json::from_str::<Said>(&text) {
+                Ok(said) => orders.send(Order::Command(tab, said)).is_ok(),
                 Err(error) => {
                     let text = format!("found a command that is none: {error}");
                     let told = serde_json::to_string(&Told::Refused { text: &text }).expect("a text");
-                    socket.send(Message::text(told)).await.is_ok()
+                    tell(&mut socket, told).await
                 }
             },
         };
@@ -184,6 +186,12 @@ async fn attend(mut socket: WebSocket, tab: Tab, orders: &Sender<Order>) {
             return;
         }
     }
+}
+
+/// Tells a tab; false where it has gone, or takes nothing. While it is told, it is not heard.
+async fn tell(socket: &mut WebSocket, text: String) -> bool {
+    let told = tokio::time::timeout(SLOWEST, socket.send(Message::text(text)));
+    matches!(told.await, Ok(Ok(())))
 }
 
 enum Step {

@@ -161,7 +161,7 @@ impl<'a, R: Real, const N: usize> Session<'a, R, N> {
 }
 
 /// What an axis may do by itself, not knowing where it is: its limits, and those of any path, which bind linear axes.
-pub(super) fn jog_axis<const N: usize>(machine: &Machine<N>, axis: usize) -> JogAxis {
+pub(crate) fn jog_axis<const N: usize>(machine: &Machine<N>, axis: usize) -> JogAxis {
     let &AxisSettings { feed_mm_s, accel_mm_s2, jerk_mm_s3, snap_mm_s4, .. } = &machine.axes[axis];
     let path = &machine.path;
     let own = Limits { accel_mm_s2, jerk_mm_s3, snap_mm_s4 };

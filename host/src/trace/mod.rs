@@ -3,6 +3,8 @@
 //! Filled by the simulation, read by the summary, the trace file and the report.
 
 pub mod columns;
+#[cfg(feature = "terminal")]
+pub mod mcap;
 
 use std::borrow::Cow;
 

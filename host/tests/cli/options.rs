@@ -1,5 +1,9 @@
 //! What is asked for and how it is shown: moments of commands and traces, columns, units, lists by purpose.
 
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::net::TcpStream;
+use std::process::Stdio;
+
 use super::workspace::{STRINGER, Workspace, number};
 
 /// Two lines of 30 mm, as lines 2 and 3.
@@ -18,14 +22,54 @@ fn a_panel_is_for_this_computer_unless_there_is_a_token() {
     let workspace = Workspace::new("panel");
     let refusal = wrong(&workspace, &["panel", "--listen", "0.0.0.0:0"]);
     assert!(refusal.contains("found --listen 0.0.0.0:0 without --token"), "{refusal}");
-    let refusal = wrong(&workspace, &["panel", "--listen", "0.0.0.0:0", "--token", "a&b"]);
-    assert!(refusal.contains("found `a&b`, expected letters and digits"), "{refusal}");
+    let refusal = wrong(&workspace, &["panel", "--listen", "0.0.0.0:0", "--token", "a&bcdefghijklmn"]);
+    assert!(
+        refusal.contains("found `a&bcdefghijklmn`, expected at least 12 letters and digits"),
+        "{refusal}"
+    );
+    let refusal = wrong(&workspace, &["panel", "--token", "short"]);
+    assert!(refusal.contains("expected at least 12 letters and digits"), "{refusal}");
     let refusal = wrong(&workspace, &["panel", "--listen", "nowhere"]);
     assert!(refusal.contains("--listen nowhere: found"), "{refusal}");
     let output = workspace.motion(&["panel", "--listen", "127.0.0.1:0", "--port", "tcp:127.0.0.1:1"]);
     assert_eq!(output.status.code(), Some(1));
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(told.contains("tcp:127.0.0.1:1: found"), "{told}");
+}
+
+/// What is served to whom, by the headers that a browser sends.
+#[test]
+fn a_panel_is_served_to_this_computer_alone() {
+    let workspace = Workspace::new("panel-served");
+    let mut panel = workspace
+        .command(&["panel", "--listen", "127.0.0.1:0"])
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("motion starts");
+    let mut line = String::new();
+    BufReader::new(panel.stdout.take().expect("its output")).read_line(&mut line).expect("text");
+    let host = line.trim().rsplit_once("http://").expect(&line).1.trim_end_matches('/').to_owned();
+    let status = |path: &str, headers: &str| {
+        let mut wire = TcpStream::connect(&host).expect("there");
+        write!(wire, "GET {path} HTTP/1.1\r\n{headers}Connection: close\r\n\r\n").expect("sent");
+        let mut answer = String::new();
+        BufReader::new(wire).read_line(&mut answer).expect("an answer");
+        answer.split(' ').nth(1).expect("a status").to_owned()
+    };
+    let upgrade =
+        "Upgrade: websocket\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n";
+    let host_of = |name: &str| format!("Host: {name}\r\n");
+    assert_eq!(status("/", &host_of(&host)), "200");
+    assert_eq!(status("/picture/1/data", &host_of(&host)), "404");
+    for path in ["/", "/picture/1/data", "/socket"] {
+        assert_eq!(status(path, &host_of("evil.example")), "403", "{path}");
+    }
+    let foreign = format!("{}Origin: http://evil.example\r\n{upgrade}", host_of(&host));
+    assert_eq!(status("/socket", &foreign), "403");
+    // A socket that no page has opened.
+    assert_eq!(status("/socket", &format!("{}{upgrade}", host_of(&host))), "403");
+    let _ = panel.kill();
+    let _ = panel.wait();
 }
 
 /// A moment is a tick, a time, or a program line.
@@ -103,6 +147,38 @@ fn a_trace_has_the_columns_and_rows_that_are_asked_for() {
 }
 
 /// No line of a comparison is longer than a screen, whatever the paths of programs.
+/// What can't be written is told before the work, and what has not come behind it.
+#[test]
+fn a_trace_that_would_be_empty_is_told() {
+    let workspace = Workspace::new("empty-trace");
+    // The column is looked at first.
+    workspace.put("wrong.ngc", "G1 Q\n");
+    let refusal = wrong(&workspace, &["run", "wrong.ngc", "--trace", "x.csv", "--columns", "t_s,Q_err_um"]);
+    assert!(refusal.contains("Q_err_um") && !refusal.contains("wrong.ngc"), "{refusal}");
+    workspace.put("part.ngc", CORNER);
+    for (from, to) in [("0.2s", "100"), ("N3", "N2")] {
+        let refusal = wrong(&workspace, &["run", "part.ngc", "--trace", "x.csv", "--from", from, "--to", to]);
+        assert!(refusal.contains("found --from behind --to"), "{refusal}");
+    }
+    let told = workspace.stdout(&["run", "part.ngc", "--trace", "x.csv", "--from", "N9"]);
+    assert!(told.contains("the trace has no tick, because what --from names has not come"), "{told}");
+    let told = workspace.stdout(&["run", "part.ngc", "--trace", "x.csv", "--from", "N3"]);
+    assert!(!told.contains("no tick"), "{told}");
+}
+
+/// A viewer's file beside the trace: a channel for each of its quantities. Like all files, it replaces no input.
+#[test]
+fn ticks_are_written_for_viewers() {
+    let workspace = Workspace::new("mcap");
+    workspace.put("part.ngc", CORNER);
+    let told = workspace.stdout(&["run", "part.ngc", "--mcap", "part.mcap"]);
+    assert!(told.contains("MCAP written to part.mcap"), "{told}");
+    let bytes = std::fs::read(workspace.0.join("part.mcap")).expect("written");
+    assert!(bytes.starts_with(b"\x89MCAP0\r\n") && bytes.ends_with(b"\x89MCAP0\r\n"));
+    let refusal = wrong(&workspace, &["run", "part.ngc", "--mcap", "part.ngc"]);
+    assert!(refusal.contains("--mcap"), "{refusal}");
+}
+
 #[test]
 fn a_comparison_fits_the_screen() {
     let workspace = Workspace::new("narrow");

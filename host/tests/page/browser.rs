@@ -152,6 +152,18 @@ impl Browser {
         self.act(json!({"type": "key", "id": "keys", "actions": actions}));
     }
 
+    /// Presses a key, and keeps it down.
+    pub(crate) fn key_down(&self, key: char) {
+        let actions = [json!({"type": "keyDown", "value": key.to_string()})];
+        self.act(json!({"type": "key", "id": "keys", "actions": actions}));
+    }
+
+    /// Releases it.
+    pub(crate) fn key_up(&self, key: char) {
+        let actions = [json!({"type": "keyUp", "value": key.to_string()})];
+        self.act(json!({"type": "key", "id": "keys", "actions": actions}));
+    }
+
     fn act(&self, input: Value) {
         self.call("actions", json!({"actions": [input]}));
     }

@@ -5,6 +5,9 @@ use std::process::{Child, Command, Stdio};
 
 use crate::browser::Browser;
 
+/// WebDriver's name for the key.
+const RIGHT: char = '\u{e014}';
+
 /// Three sides of a square, with a stop in between.
 const PROGRAM: &str = "G21 G90 G61\nG1 X10 F3000\nY10\n(MSG, turn the part)\nM0\nX0\nM2\n";
 
@@ -74,8 +77,8 @@ pub(crate) fn a_program_is_driven_from_the_panel() {
     // The picture of it, too.
     wait(&browser, "window.panel.pictures.page?.run.header.program === 'part.ngc'");
     assert!(browser.number("window.panel.pictures.page.run.header.length_mm") == 30.0);
-    // Half as fast, by the keys that LinuxCNC's operators know.
-    browser.run("document.activeElement.blur()");
+    // Half as fast, by the keys that LinuxCNC's operators know. A file that was chosen has the focus no more.
+    browser.run("document.querySelector('input[type=file]').focus(); document.activeElement.dispatchEvent(new Event('change'))");
     browser.keys("5");
     wait(&browser, "document.querySelector('[data-of=override]').textContent === '50 %'");
     browser.keys("r");
@@ -109,9 +112,10 @@ pub(crate) fn a_key_jogs_while_it_is_down() {
     let place = browser.middle("[data-key='Y+']");
     browser.drag(&[place, place]);
     wait(&browser, "document.querySelectorAll('.positions td')[2].textContent === '1.000 mm'");
-    browser.run("document.querySelector('[data-of=distance]').value = ''; window.panel.controls.press('X', '+', 'pointer')");
+    browser.run("document.querySelector('[data-of=distance]').value = ''; document.activeElement.blur()");
+    browser.key_down(RIGHT);
     wait(&browser, &state("moving"));
-    browser.run("window.panel.controls.release('pointer')");
+    browser.key_up(RIGHT);
     wait(&browser, &state("ready"));
     let x_mm = browser.number("parseFloat(document.querySelector('.positions td').textContent)");
     assert!(x_mm > 0.0 && x_mm < 900.0, "{x_mm}");
