@@ -9,10 +9,11 @@ use motion_kernel::num::{Fixed, Root};
 use super::error::{CliError, Outcome};
 use super::input;
 use super::outputs::Written;
+use super::progress;
 use crate::files::{Files, OutputFile};
 use crate::gcode::Program;
 use crate::machine::{Machine, on_machine};
-use crate::planning::{Executable, Mode, Plan, plan_program, require_outputs};
+use crate::planning::{Executable, Mode, Plan, require_outputs};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -90,7 +91,7 @@ fn compile_for<const N: usize>(
     if !arguments.no_spindle {
         require_outputs(source_name, &program.steps, machine)?;
     }
-    let plan = plan_program(source_name, program, machine, mode)?;
+    let plan = progress::plan(source_name, program, machine, mode)?;
     plan.refuse_probes()?;
     let executable = match arguments.number {
         Number::F32 => executable::<f32, N>(&plan, machine),

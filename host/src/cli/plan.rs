@@ -9,9 +9,9 @@ use serde::Serialize;
 
 use super::error::{CliError, Outcome};
 use super::table::{self, Align};
-use super::{input, write_json};
+use super::{input, progress, write_json};
 use crate::machine::on_machine;
-use crate::planning::{Mode, PlacedRamp, Plan, plan_blocks, plan_program};
+use crate::planning::{Mode, PlacedRamp, Plan, plan_blocks};
 use crate::trace::TracedBlock;
 
 const EXAMPLES: &str = "\
@@ -110,7 +110,7 @@ pub fn plan(arguments: &PlanArguments, out: &mut dyn Write) -> Result<Outcome, C
         return show(arguments, &plan, out);
     }
     let program = arguments.reading.program(&source, machine.read_options())?;
-    on_machine!(machine, machine => show(arguments, &plan_program(&source.name, &program, machine, mode)?, out))
+    on_machine!(machine, machine => show(arguments, &progress::plan(&source.name, &program, machine, mode)?, out))
 }
 
 fn show<const N: usize>(

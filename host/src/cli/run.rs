@@ -11,6 +11,7 @@ use super::against;
 use super::error::{CliError, Outcome};
 use super::input;
 use super::outputs::{self, Outputs, Written};
+use super::progress;
 use super::read::direction;
 use super::table::{self, Align};
 use super::trace::TraceArguments;
@@ -19,7 +20,7 @@ use super::write_json;
 use crate::files::{Files, OutputFile};
 use crate::gcode::Axis;
 use crate::machine::{Machine, on_machine};
-use crate::planning::{Mode, Plan, plan_program};
+use crate::planning::{Mode, Plan};
 use crate::recording::Recorder;
 use crate::simulate::inject::Injections;
 use crate::simulate::live::Script;
@@ -136,7 +137,7 @@ pub fn run(arguments: &RunArguments, out: &mut dyn Write) -> Result<Outcome, Cli
             Some(path) => outputs.against(against::run(path, &reading, machine)?),
             None => outputs,
         };
-        let plan = plan_program(&source.name, &program, machine, Mode::Spanning)?;
+        let plan = progress::plan(&source.name, &program, machine, Mode::Spanning)?;
         execute(&options, &plan, machine, outputs.of_program(&source.text, &plan), record)
     })?;
     // A run that ended early has not set what the program would set later.

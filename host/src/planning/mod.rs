@@ -58,7 +58,7 @@ pub use error::{Place, PlanningError, Problem};
 pub use executable::Executable;
 pub use outputs::require_outputs;
 pub use profile::PlacedRamp;
-pub use program::{Planner, plan_moves, plan_program};
+pub use program::{Planner, plan_moves, plan_program, plan_program_in_view};
 pub(crate) use program::{assumed_path, notes};
 pub(crate) use rest::rest_of_stretch;
 pub use spline::plan_spline;

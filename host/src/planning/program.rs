@@ -24,9 +24,29 @@ pub fn plan_program<const N: usize>(
     machine: &Machine<N>,
     mode: Mode,
 ) -> Result<Plan<N>, PlanningError> {
+    plan_program_in_view(source_name, program, machine, mode, &mut |_| {})
+}
+
+/// Steps of a program between two looks at how far it is: a second, at the slowest.
+const STEPS_IN_VIEW: usize = 1000;
+
+/// [`plan_program`], the same to the bit; `on_taken` is told how many steps are taken since it was told last.
+///
+/// # Errors
+/// As [`plan_program`].
+pub fn plan_program_in_view<const N: usize>(
+    source_name: &str,
+    program: &Program,
+    machine: &Machine<N>,
+    mode: Mode,
+    on_taken: &mut dyn FnMut(usize),
+) -> Result<Plan<N>, PlanningError> {
     let machine = &driven(machine, mode);
     let mut planner = Planner::with_mode(source_name, program, machine, mode);
-    planner.take(&program.steps)?;
+    for steps in program.steps.chunks(STEPS_IN_VIEW) {
+        planner.take(steps)?;
+        on_taken(steps.len());
+    }
     planner.finish()
 }
 

@@ -24,6 +24,7 @@ use self::shown::Shown;
 use super::error::{CliError, Outcome};
 use super::input;
 use super::port::{DriveArguments, OnBoard, PortArguments};
+use super::progress;
 use super::scope::ScopeArguments;
 use crate::board::from_line::from_line;
 use crate::board::items::{Said, Source};
@@ -35,7 +36,7 @@ use crate::files::STANDARD_INPUT;
 use crate::files::interrupt::{self, Asked};
 use crate::gcode::{self, Program, ReadOptions};
 use crate::machine::{Machine, on_machine};
-use crate::planning::{Executable, Mode as PlanMode, Plan, PlanningError, plan_program, require_outputs};
+use crate::planning::{Executable, Mode as PlanMode, Plan, PlanningError, require_outputs};
 use crate::simulate::RunInfo;
 
 const EXAMPLES: &str = "\
@@ -152,7 +153,7 @@ fn send_program(
         if !arguments.no_spindle {
             require_outputs(&source.name, &program.program.steps, machine)?;
         }
-        let plan = plan_program(&source.name, program.program, machine, PlanMode::Spanning)?;
+        let plan = progress::plan(&source.name, program.program, machine, PlanMode::Spanning)?;
         plan.refuse_probes()?;
         for notice in plan.notices.iter().filter(|_| !arguments.json) {
             writeln!(out, "note: {notice}").map_err(CliError::Output)?;
