@@ -122,7 +122,7 @@ pub fn explore<E>(
 
 /// The greatest acceleration of a run \[mm/s²\], over a time in which the encoder shows it.
 fn accel_mm_s2(run: &AxisRecording) -> f64 {
-    let begins = run.command_mm_s.iter().position(|command| *command != 0.0).unwrap_or(0);
+    let begins = run.command_mm_s.iter().position(|command| *command != run.rest_mm_s()).unwrap_or(0);
     let most = |parabolas: Parabolas, positions: &[f64]| {
         parabolas.of(positions).map(|(_, _, accel)| accel.abs()).fold(0.0, f64::max)
     };

@@ -5,11 +5,12 @@
 //! right one can be seen: a right model leaves the errors of the readings and nothing else.
 
 use super::bed::likely_beds;
+use super::cholesky::Symmetric;
 use super::confidence::{Confidence, confidence, floor};
 use super::differences::Parabolas;
 use super::estimate::MET;
 use super::parameters::{ALL, Unknown, Unknowns, without_bed};
-use super::readings::{Precision, Runs};
+use super::readings::{Precision, Runs, dot};
 use super::recording::{AxisRecording, span};
 use super::search::{Effort, Found, search};
 use super::simulation::SUBSTEPS;
@@ -33,8 +34,9 @@ const FOLLOWED: usize = 6;
 const CONTINUED: usize = 2;
 
 /// Unknowns of the first stage.
-const COARSE: [Unknown; 6] = [
+const COARSE: [Unknown; 7] = [
     Unknown::Gain,
+    Unknown::Offset,
     Unknown::VelocityGain,
     Unknown::IntegralTime,
     Unknown::Lag,
@@ -319,13 +321,14 @@ fn coarse(recordings: &[AxisRecording], resolution_mm: f64) -> Result<Vec<Unknow
         recordings.iter().filter(|run| run.harmonic_hz.is_none()).cloned().collect();
     let chosen = if steps.is_empty() { recordings } else { &steps };
     let runs = Runs::new(chosen, resolution_mm);
-    let gain = slope(chosen);
+    let (gain, drift_mm_s) = slope_and_drift(chosen);
     let sustained_accel_mm_s2 = sustained_accel_mm_s2(chosen);
     if gain < 0.0 {
         return Err(IdentifyError::Reversed { slope: gain });
     }
     let mut first = Unknowns::zero(chosen[0].tick_s / f64::from(SUBSTEPS));
     first.set(Unknown::Gain, gain.clamp(0.2, 5.0));
+    first.set(Unknown::Offset, drift_mm_s);
     first.set(Unknown::Viscous, 0.05);
     first.set(Unknown::BedFrequency, 10.0);
     let mut starts = Vec::new();
@@ -377,19 +380,31 @@ fn coarse(recordings: &[AxisRecording], resolution_mm: f64) -> Result<Vec<Unknow
     Ok(found.into_iter().take(CONTINUED).map(|found| found.unknowns).collect())
 }
 
-/// Change of position over change of the command's integral, over all runs.
-fn slope(recordings: &[AxisRecording]) -> f64 {
-    let (mut common, mut power) = (0.0, 0.0);
+/// How an axis without any lag would fit best: by its gain, and its velocity at command 0 \[mm/s\].
+///
+/// A run without a lag is off by a lag's travel in every one of its motions, and back after it.
+fn slope_and_drift(recordings: &[AxisRecording]) -> (f64, f64) {
+    let mut normal = Symmetric::zero(2);
+    let mut right = [0.0; 2];
     for run in recordings {
-        let commanded = run.commanded_mm();
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        let (actual_mean, commanded_mean) = (mean(&run.actual_mm), mean(&commanded));
-        for (actual, commanded) in run.actual_mm.iter().zip(&commanded) {
-            common += (actual - actual_mean) * (commanded - commanded_mean);
-            power += (commanded - commanded_mean).powi(2);
+        let times_s: Vec<f64> = (0..run.actual_mm.len()).map(|tick| tick as f64 * run.tick_s).collect();
+        let centred = |values: &[f64]| {
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            values.iter().map(|value| value - mean).collect::<Vec<f64>>()
+        };
+        let columns = [centred(&run.commanded_mm()), centred(&times_s)];
+        let actual = centred(&run.actual_mm);
+        for (row, column) in columns.iter().enumerate() {
+            right[row] += dot(column, &actual);
+            for (other, values) in columns.iter().enumerate() {
+                *normal.at_mut(row, other) += dot(column, values);
+            }
         }
     }
-    if power > 0.0 { common / power } else { 1.0 }
+    match normal.solve(&right).as_deref() {
+        Some(&[gain, drift_mm_s]) => (gain, drift_mm_s),
+        _ => (1.0, 0.0),
+    }
 }
 
 fn matches(runs: &Runs, recordings: &[AxisRecording], found: &Found) -> Result<Vec<RunMatch>, IdentifyError> {

@@ -25,11 +25,14 @@ const SAME_ROUNDING: f64 = 0.2;
 /// ... until together they have moved by this part.
 const NEXT_ROUNDING: f64 = 0.5;
 
-/// Ticks at command 0 after which an axis is quiet, but for the start of a run, where it stands.
+/// Ticks of the command of rest after which an axis is quiet, but for the start of a run, where it stands.
 const QUIET_TICKS: usize = 600;
 
 /// Variance of a number between 0 and 1 of which nothing is known.
 pub(super) const UNIFORM: f64 = 1.0 / 12.0;
+
+/// Variance of readings, in counts², below which they are those of an axis that creeps over a count now and then.
+const CREEP: f64 = 0.1 * UNIFORM;
 
 /// How exactly the model is asked to follow.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -352,20 +355,37 @@ impl Runs {
 /// The variance of a reading besides rounding \[mm²\], from second differences where the axis is quiet.
 fn noise_mm2(recordings: &[AxisRecording], resolution_mm: f64) -> f64 {
     let (mut squares, mut count) = (0.0, 0.0);
-    for run in recordings {
-        let mut quiet = QUIET_TICKS;
-        for (tick, readings) in run.actual_mm.windows(3).enumerate() {
-            quiet = if run.command_mm_s[tick] == 0.0 { quiet + 1 } else { 0 };
-            if quiet > QUIET_TICKS {
-                squares += (readings[0] - 2.0 * readings[1] + readings[2]).powi(2);
-                count += 1.0;
-            }
-        }
+    for readings in recordings.iter().flat_map(quiet) {
+        // By then an axis that drifts has reached its velocity.
+        let settled = &readings[readings.len() / 2..];
+        let [first, .., last] = settled else { continue };
+        // Drift changes the rounding: a count once in a while at first, and then every reading has its own.
+        let drift = (last - first).abs() / (settled.len() - 1) as f64;
+        let rounding = (drift * resolution_mm / 3.0).min(UNIFORM * resolution_mm * resolution_mm);
+        let readings = if rounding > CREEP * resolution_mm * resolution_mm { settled } else { readings };
+        let differences = readings.windows(3).map(|at| at[0] - 2.0 * at[1] + at[2]);
+        let n = readings.len().saturating_sub(2) as f64;
+        // Second differences of independent readings have six times their variance.
+        squares += differences.map(|value| value * value).sum::<f64>() / 6.0 - n * rounding;
+        count += n;
     }
-    // Second differences of independent readings have six times their variance. Less than a tenth of what
-    // rounding has is an axis that creeps over a count now and then.
-    let noise = if count > 0.0 { squares / count / 6.0 } else { 0.0 };
-    if noise > 0.1 * UNIFORM * resolution_mm * resolution_mm { noise } else { 0.0 }
+    let noise = if count > 0.0 { squares / count } else { 0.0 };
+    if noise > CREEP * resolution_mm * resolution_mm { noise } else { 0.0 }
+}
+
+/// The stretches of a run in which nothing is asked of the axis, and nothing has been for a while.
+fn quiet(run: &AxisRecording) -> Vec<&[f64]> {
+    let is_rest = |tick: usize| run.command_mm_s[tick] == run.rest_mm_s();
+    let mut stretches = Vec::new();
+    let mut start = 0;
+    while start < run.command_mm_s.len() {
+        let end = (start..run.command_mm_s.len()).find(|&tick| !is_rest(tick));
+        let end = end.unwrap_or(run.command_mm_s.len());
+        let begins = if start == 0 { 0 } else { start + QUIET_TICKS };
+        stretches.extend(run.actual_mm.get(begins..end));
+        start = end + 1;
+    }
+    stretches
 }
 
 fn normal(columns: &[Vec<f64>]) -> Symmetric {

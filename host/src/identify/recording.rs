@@ -10,7 +10,7 @@ const TICKS_MIN: usize = 50;
 
 /// One run of one axis: what the converter put out and what the encoder read, tick by tick.
 ///
-/// The axis is at rest when it begins, with its command at 0 (within the drive's dead time before it).
+/// The axis is at rest when it begins, under the command it begins with: 0, or a trim that holds it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AxisRecording {
     /// Control tick \[s\], > 0; the same in all runs.
@@ -54,6 +54,11 @@ impl AxisRecording {
             return Err(IdentifyError::NotFinite { run, quantity: "harmonic_hz", tick: 0, value });
         }
         Ok(())
+    }
+
+    /// The command of an axis at rest \[mm/s\]: what holds it, the trim included.
+    pub(super) fn rest_mm_s(&self) -> f64 {
+        self.command_mm_s.first().copied().unwrap_or_default()
     }
 
     /// The position of an axis without any lag at the start of each tick \[mm\].
