@@ -80,6 +80,9 @@ const OTHERS: usize = 2;
 /// readings (Schwarz), and by as much again as chance does in one of e¹⁵ cases.
 const BED_GAIN: f64 = 30.0;
 
+/// Two searches for one minimum end this far apart: positions are stairs where the limit acts, if low ones.
+const STAIRS: f64 = 10.0;
+
 /// Mass ratio of a bed without which nothing followed.
 const CERTAIN_RATIO: f64 = 1e-3;
 
@@ -302,7 +305,8 @@ fn settled(
 }
 
 /// The same without a command filter, if that one unknown is not worth its logarithm of the number of readings
-/// (Schwarz).
+/// (Schwarz), and what the stairs of the current limit may give it. What has the filter stays a rival, so intervals
+/// span both.
 fn without_filter(runs: &Runs, found: &Found, free: &[Unknown]) -> Option<Found> {
     let others: Vec<Unknown> =
         free.iter().copied().filter(|unknown| *unknown != Unknown::FilterSpread).collect();
@@ -310,8 +314,9 @@ fn without_filter(runs: &Runs, found: &Found, free: &[Unknown]) -> Option<Found>
     start.set(Unknown::FilterSpread, 0.0);
     let simpler = search(runs, start, &others, SETTLING_EFFORT)?;
     let readings: f64 = runs.readings().sum();
-    let is_enough = simpler.misfit() < found.misfit() + readings.ln();
-    is_enough.then(|| Found { rivals: found.rivals.clone(), ..simpler })
+    let is_enough = simpler.misfit() < found.misfit() + readings.ln() + STAIRS;
+    let rivals = || found.rivals.iter().copied().chain([found.unknowns]).collect();
+    is_enough.then(|| Found { rivals: rivals(), ..simpler })
 }
 
 /// The first stage, on runs that are not harmonic if there are such: a grid, and searches from its best
