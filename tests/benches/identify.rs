@@ -19,8 +19,9 @@ fn main() {
             if seed >= to {
                 return done;
             }
-            done.push(surveyed(seed));
-            eprintln!("seed {seed}");
+            let one = surveyed(seed);
+            eprintln!("{}", one.words());
+            done.push(one);
         }
     };
     let cores = std::thread::available_parallelism().map_or(1, usize::from);

@@ -10,6 +10,8 @@ use hal_sim::{
 use motion_host::identify::{
     AxisParametersFound, AxisRecording, Estimate, Excitation, Identification, explore, identify,
 };
+use motion_host::machine::Machine;
+use motion_host::tuning::{Margins, Method, propose};
 use motion_kernel::units::DacCode;
 
 use crate::random::Random;
@@ -161,8 +163,33 @@ pub struct Surveyed {
     pub has_bed: bool,
     /// Whether it says that the model explains the recordings.
     pub is_met: bool,
+    /// The margins of the loop that is proposed: as they are claimed, and those of the drive as it is. Without, tuning
+    /// was refused.
+    pub margins: Option<[Margins; 2]>,
     /// Time that it took \[s\]: of the processor, where the system tells it.
     pub time_s: f64,
+}
+
+impl Surveyed {
+    /// What is to be said of it, in a line.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let seed = self.axis.seed;
+        let found = match &self.found {
+            Ok(found) => found,
+            Err(error) => return format!("seed {seed}: refused: {error}"),
+        };
+        let worst = found.iter().max_by(|a, b| a.half_widths_off().total_cmp(&b.half_widths_off()));
+        let worst =
+            worst.map_or_else(String::new, |one| format!("{} {:.1}", one.name, one.half_widths_off()));
+        let bed = match (self.axis.drive.bed, self.has_bed) {
+            (Some(bed), false) => format!(", bed missed at a mass ratio of {:.3}", bed.mass_ratio),
+            (None, true) => ", a bed that is not there".to_owned(),
+            _ => String::new(),
+        };
+        let met = if self.is_met { "" } else { ", says that the model does not follow" };
+        format!("seed {seed}: half-widths off: {worst}{bed}{met}, {:.1} s", self.time_s)
+    }
 }
 
 /// The drive of a seed, recorded and identified.
@@ -180,11 +207,27 @@ pub fn surveyed(seed: u64) -> Surveyed {
     let time_s = processor_s() - start_s;
     let has_bed = found.as_ref().is_ok_and(|found| found.parameters.bed.is_some());
     let is_met = found.as_ref().is_ok_and(Identification::is_met);
+    let margins = found.as_ref().ok().and_then(|found| margins(&axis, found));
     let found = match found {
         Ok(found) => Ok(compared(&axis, &found.parameters)),
         Err(error) => Err(error.to_string()),
     };
-    Surveyed { axis, found, has_bed, is_met, time_s }
+    Surveyed { axis, found, has_bed, is_met, margins, time_s }
+}
+
+/// The proposed loop's margins in the drive that was found, and in the true one.
+fn margins(axis: &RandomAxis, found: &Identification) -> Option<[Margins; 2]> {
+    let mut settings = Machine::reference().axes[0].clone();
+    settings.mm_per_count = axis.encoder.resolution_mm;
+    let tuning = propose(&settings, found, Method::Inverse, REFERENCE_TICK_S).ok()?;
+    Some([tuning.margins, Margins::of(&axis.drive, tuning.gains.kp_per_s, REFERENCE_TICK_S)])
+}
+
+/// By how much phase and gain margin are off, as a part of the true ones.
+fn margins_off([claimed, is]: &[Margins; 2]) -> f64 {
+    // The gain margin of a loop without any is infinite in both.
+    let off = |claimed: f64, is: f64| if claimed == is { 0.0 } else { (claimed / is - 1.0).abs() };
+    off(claimed.phase_deg, is.phase_deg).max(off(claimed.gain, is.gain))
 }
 
 /// The time that this thread has had of a processor \[s\]; of the clock where the system does not tell.
@@ -231,6 +274,16 @@ pub fn report(all: &[Surveyed]) -> String {
     line(format!("| without a bed | {} |", rigid().count()));
     line(format!("| bed that is not there | {} |", rigid().filter(|one| one.has_bed).count()));
     line(format!(
+        "| not tuned: too little is determined | {} |",
+        count(&mut all.iter().filter(|one| one.margins.is_none()))
+    ));
+    let margins: Vec<f64> = all.iter().filter_map(|one| one.margins.as_ref()).map(margins_off).collect();
+    let worst_part = 100.0 * margins.iter().copied().fold(0.0, f64::max);
+    line(format!(
+        "| margins off by over 2 % (at most {worst_part:.2} %) | {} |",
+        margins.iter().filter(|off| !(**off <= 0.02)).count()
+    ));
+    line(format!(
         "\nProcessor time of an identification: median {:.1} s, 95 % below {:.1} s, at most {:.1} s.\n",
         at(0.5),
         at(0.95),
@@ -259,10 +312,10 @@ pub fn report(all: &[Surveyed]) -> String {
         line(format!("| `{name}` | {} | {share:.1} % | {beyond} | {worst:.1} | {seed} |", off.len()));
     }
     line(String::new());
-    for one in all {
-        if let Err(error) = &one.found {
-            line(format!("- seed {}: refused: {error}", one.axis.seed));
-        }
+    let is_off = |one: &Surveyed| one.found.iter().flatten().any(|one| !(one.half_widths_off() <= 4.0));
+    let is_right = |one: &Surveyed| one.is_met && one.has_bed == one.axis.drive.bed.is_some() && !is_off(one);
+    for one in all.iter().filter(|one| !is_right(one)) {
+        line(format!("- {}", one.words()));
     }
     text
 }

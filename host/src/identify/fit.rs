@@ -126,7 +126,8 @@ impl Stages {
     /// The last two stages.
     fn last(&self, start: Unknowns, free: &[Unknown]) -> Option<Found> {
         let fine = self.stage(start, free, FINE_EFFORT)?;
-        self.kicked(self.with_rivals(search(&self.runs, fine.unknowns, free, LAST_EFFORT)?, free)?, free)
+        let found = search(&self.runs, fine.unknowns, free, LAST_EFFORT)?;
+        self.kicked(self.with_rivals(found, free)?, free)
     }
 
     /// What was found, or better if the search had stopped on its way along the floor of a valley.
@@ -216,11 +217,17 @@ impl Stages {
         };
         self.runs.regroup(&bed.unknowns, SUBSTEPS);
         let bed = self.last(bed.unknowns, &ALL)?;
-        if bed.misfit() < MET * self.readings() && bed.unknowns.get(Unknown::BedMassRatio) > CERTAIN_RATIO {
-            // The rigid model missed it by far already.
+        let mut start = bed.unknowns;
+        start.set(Unknown::BedMassRatio, 0.0);
+        let beside = search(&self.runs, start, without_bed(), EXCHANGED_EFFORT);
+        let beside = beside.filter(|beside| beside.misfit() < bed.misfit() + NEAR);
+        let is_met = bed.misfit() < MET * self.readings();
+        if is_met && bed.unknowns.get(Unknown::BedMassRatio) > CERTAIN_RATIO && beside.is_none() {
+            // The rigid model misses it by far, wherever it starts.
             return Some((bed, &ALL));
         }
-        let rigid = self.last(middle.unknowns, without_bed())?;
+        let beside = beside.and_then(|near| search(&self.runs, near.unknowns, without_bed(), LAST_EFFORT));
+        let rigid = least([self.last(middle.unknowns, without_bed()), beside].into_iter().flatten())?;
         Some(if self.is_bed(&rigid, &bed) { (bed, &ALL) } else { (rigid, without_bed()) })
     }
 
