@@ -13,7 +13,7 @@
 //!   positions are those that were recorded (output error, least squares). Noise of the encoder thus enters
 //!   once, is not differentiated, and does not bend the result.
 //!
-//! The errors of the readings are known ([`readings`], [`moments`]), so how well a model follows says whether it is
+//! The errors of the readings are known (`readings`, `moments`), so how well a model follows says whether it is
 //! the right one. The model knows nothing of backlash, cogging and pitch errors. Where these matter,
 //! [`Identification::misfit_per_reading`] is far above 1, and intervals are as wide as what is left allows.
 //!
