@@ -12,6 +12,8 @@ pub mod bytes;
 pub mod cycles;
 #[allow(missing_docs, reason = "arithmetic")]
 pub mod dd;
+#[cfg(feature = "host")]
+pub mod drives;
 pub mod figures;
 pub mod fuzz;
 pub mod judge;

@@ -10,6 +10,7 @@ use crate::board::emulated::EmulatedError;
 use crate::board::from_line::FromLineError;
 use crate::cli::send::resume::ResumeError;
 use crate::drive::DriveError;
+use crate::drive::recorded::RecordedError;
 use crate::files::FilesError;
 use crate::flight::FlightError;
 use crate::gcode::GcodeError;
@@ -147,6 +148,9 @@ pub enum CliError {
     /// The file is no list of points.
     #[error(transparent)]
     Points(#[from] PointsError),
+    /// A recording of an axis can't be used.
+    #[error(transparent)]
+    Recorded(#[from] RecordedError),
     /// The points have no spline.
     #[error("{place}: found {source}")]
     Spline {

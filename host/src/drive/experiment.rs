@@ -197,7 +197,8 @@ fn countable_mm_s(axis: &AxisSettings, tick_s: f64) -> f64 {
 
 /// The greatest feed of an experiment that moves all of `axes` \[mm/s\]: what their outputs reach and their
 /// encoders can follow.
-pub(super) fn fastest_mm_s(machine: &Machine, axes: &[usize]) -> f64 {
+#[must_use]
+pub fn fastest_mm_s(machine: &Machine, axes: &[usize]) -> f64 {
     let of = |axis: &AxisSettings| axis.reachable_mm_s().min(countable_mm_s(axis, machine.tick_s));
     axes.iter().filter_map(|&axis| machine.axes.get(axis)).map(of).fold(f64::INFINITY, f64::min)
 }

@@ -10,8 +10,13 @@ use super::AXES;
 use super::circle_motion::{Circle, plane_of};
 use super::experiment::{DriveError, Recording, fastest_mm_s, open_loop, raised};
 use super::step;
-use crate::identify::{AxisRecording, Excitation, Identification, identification_plan, identify};
+use crate::identify::{AxisRecording, Excitation, Identification, explore, identify};
 use crate::machine::Machine;
+
+/// Revolutions that a circle makes besides those that are measured.
+const RAMP_PERIODS: u32 = 6;
+/// The part of what a pair of axes reaches that its circles take.
+const PAIR_SHARE: f64 = 0.95;
 
 const LETTERS: [&str; AXES] = ["X", "Y", "Z"];
 
@@ -38,7 +43,7 @@ pub fn identify_axes(machine: &Machine, axes: &[usize]) -> Result<Vec<Identifica
     })
 }
 
-/// The recordings of one axis, in the order of [`identification_plan`].
+/// The recordings of one axis: those of [`explore`].
 ///
 /// # Errors
 /// A run can't be made.
@@ -47,30 +52,26 @@ pub fn recordings(machine: &Machine, axis: usize) -> Result<Vec<AxisRecording>, 
     // Steps move this axis, circles another one, too, which may be slower.
     let plane = plane_of(axis);
     let [first, second, _] = plane.axes();
-    let alone = identification_plan(fastest_mm_s(machine, &[axis]));
-    let in_pairs = identification_plan(fastest_mm_s(machine, &[first, second]));
-    alone
-        .into_iter()
-        .zip(in_pairs)
-        .map(|(alone, in_pairs)| {
-            let excitation = if alone.harmonic_hz().is_some() { in_pairs } else { alone };
-            let recording = match excitation {
-                Excitation::Steps { feed_mm_s, cruise_s, rest_s } => {
-                    steps(machine, axis, feed_mm_s, cruise_s, rest_s)?
-                }
-                Excitation::Harmonic { amplitude_mm_s, frequency_hz, periods } => {
-                    let circle = Circle {
-                        plane,
-                        settle_s: 0.0,
-                        measured_s: f64::from(periods) / frequency_hz,
-                        ..Circle::new(frequency_hz, amplitude_mm_s)
-                    };
-                    circle.record(&open_loop(machine))?
-                }
-            };
-            Ok(of_axis(&recording, axis, excitation.harmonic_hz()))
-        })
-        .collect()
+    let in_pairs_mm_s = PAIR_SHARE * fastest_mm_s(machine, &[first, second]);
+    explore(machine.tick_s, fastest_mm_s(machine, &[axis]), |excitation| {
+        let recording = match *excitation {
+            Excitation::Steps { feed_mm_s, cruise_s, rest_s } => {
+                steps(machine, axis, feed_mm_s, cruise_s, rest_s)?
+            }
+            Excitation::Harmonic { amplitude_mm_s, frequency_hz, periods } => {
+                // Reaching the feed and braking takes some of the periods.
+                let measured = periods.saturating_sub(RAMP_PERIODS).max(1);
+                let circle = Circle {
+                    plane,
+                    settle_s: 0.0,
+                    measured_s: f64::from(measured) / frequency_hz,
+                    ..Circle::new(frequency_hz, amplitude_mm_s.min(in_pairs_mm_s))
+                };
+                circle.record(&open_loop(machine))?
+            }
+        };
+        Ok(of_axis(&recording, axis, excitation.harmonic_hz()))
+    })
 }
 
 /// 0 → feed → 0 → −feed → 0, each change within one tick.

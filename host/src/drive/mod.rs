@@ -13,6 +13,7 @@
 //! - [`step`]: the feed steps within one tick, open loop;
 //! - [`harmonic`]: amplitude and phase of the velocity;
 //! - [`identification`]: the runs that [`crate::identify`] asks for;
+//! - [`recorded`]: an axis from a recording or CSV, for identification without a simulation;
 //! - [`inertia`]: harmonic motion under a growing load, until the current limit shows;
 //! - [`circle`](mod@circle): contour error, form deviation, following error;
 //! - [`compare`]: regulators side by side; [`peer_regulator`]: one that differences positions;
@@ -35,6 +36,7 @@ pub mod inverse;
 pub mod learning;
 pub mod model;
 pub mod peer_regulator;
+pub mod recorded;
 pub mod reference;
 pub mod replay;
 

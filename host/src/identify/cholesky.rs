@@ -12,6 +12,10 @@ impl Symmetric {
         Self { order, cells: vec![0.0; order * order] }
     }
 
+    pub(super) fn order(&self) -> usize {
+        self.order
+    }
+
     pub(super) fn at(&self, row: usize, column: usize) -> f64 {
         self.cells[row * self.order + column]
     }
@@ -20,13 +24,8 @@ impl Symmetric {
         &mut self.cells[row * self.order + column]
     }
 
-    /// Adds `factor` × `other`, which has the same order.
-    pub(super) fn add(&mut self, factor: f64, other: &Self) {
-        self.cells.iter_mut().zip(&other.cells).for_each(|(cell, other)| *cell += factor * other);
-    }
-
-    /// The solution for one right-hand side; `None` if the matrix is not positive.
-    pub(super) fn solve(&self, right: &[f64]) -> Option<Vec<f64>> {
+    /// The lower factor L of LLᵀ; `None` if the matrix is not positive.
+    pub(super) fn factor(&self) -> Option<Lower> {
         let n = self.order;
         let mut factor = self.cells.clone();
         for column in 0..n {
@@ -44,29 +43,72 @@ impl Symmetric {
                 }
             }
         }
+        Some(Lower { order: n, cells: factor })
+    }
+
+    /// The solution for one right-hand side; `None` if the matrix is not positive.
+    pub(super) fn solve(&self, right: &[f64]) -> Option<Vec<f64>> {
+        let factor = self.factor()?;
         let mut solution = right.to_vec();
-        for row in 0..n {
-            let inner: f64 = (0..row).map(|k| factor[row * n + k] * solution[k]).sum();
-            solution[row] = (solution[row] - inner) / factor[row * n + row];
-        }
-        for row in (0..n).rev() {
-            let inner: f64 = (row + 1..n).map(|k| factor[k * n + row] * solution[k]).sum();
-            solution[row] = (solution[row] - inner) / factor[row * n + row];
-        }
+        factor.forward(&mut solution);
+        factor.backward(&mut solution);
         Some(solution)
     }
 
     /// The inverse; `None` if the matrix is not positive.
     pub(super) fn inverse(&self) -> Option<Self> {
+        let factor = self.factor()?;
         let mut inverse = Self::zero(self.order);
         for column in 0..self.order {
             let mut unit = vec![0.0; self.order];
             unit[column] = 1.0;
-            for (row, value) in self.solve(&unit)?.into_iter().enumerate() {
+            factor.forward(&mut unit);
+            factor.backward(&mut unit);
+            for (row, value) in unit.into_iter().enumerate() {
                 *inverse.at_mut(row, column) = value;
             }
         }
         Some(inverse)
+    }
+}
+
+/// A lower triangular matrix, row by row; what is above the diagonal is not read.
+#[derive(Clone, Debug)]
+pub(super) struct Lower {
+    order: usize,
+    cells: Vec<f64>,
+}
+
+impl Lower {
+    /// Multiplies every row by its factor.
+    pub(super) fn scale_rows(&mut self, factors: &[f64]) {
+        for (row, factor) in self.cells.chunks_mut(self.order.max(1)).zip(factors) {
+            row.iter_mut().for_each(|cell| *cell *= factor);
+        }
+    }
+
+    /// `right` becomes L⁻¹·right.
+    pub(super) fn forward(&self, right: &mut [f64]) {
+        let n = self.order;
+        for row in 0..n {
+            let inner: f64 = (0..row).map(|k| self.cells[row * n + k] * right[k]).sum();
+            right[row] = (right[row] - inner) / self.cells[row * n + row];
+        }
+    }
+
+    /// `right` becomes L⁻ᵀ·right.
+    pub(super) fn backward(&self, right: &mut [f64]) {
+        let n = self.order;
+        for row in (0..n).rev() {
+            let inner: f64 = (row + 1..n).map(|k| self.cells[k * n + row] * right[k]).sum();
+            right[row] = (right[row] - inner) / self.cells[row * n + row];
+        }
+    }
+
+    /// `right` becomes L·right.
+    pub(super) fn times(&self, right: &[f64]) -> Vec<f64> {
+        let n = self.order;
+        (0..n).map(|row| (0..=row).map(|k| self.cells[row * n + k] * right[k]).sum()).collect()
     }
 }
 

@@ -1,23 +1,36 @@
 //! How well the recordings fix the unknowns.
 //!
-//! Residuals of neighbouring ticks resemble each other, so n of them tell as little as n/γ independent ones;
-//! γ is one plus twice the sum of their autocorrelation. The covariance of the unknowns is the inverse of the
-//! information that is left.
+//! The covariance of the unknowns, in the search's coordinates, is the inverse of the information of all runs.
+//! Residuals that resemble their neighbours tell less: n of them as little as n/γ independent ones, with γ one
+//! plus twice the sum of their autocorrelation.
+//!
+//! Where the model does not follow, what is left of the recordings may be the work of anything. An unknown moves by
+//! at most √left standard deviations for a remainder of `left` (Cauchy and Schwarz), and intervals become as much
+//! wider.
+//!
+//! Intervals of what is made from several unknowns, and of what has a bound, are not those of a parabola. So
+//! samples are drawn from the covariance, cut to the bounds, and the interval is what holds 95 of 100.
 
-use super::cholesky::Symmetric;
-use super::parameters::{COUNT, Unknown};
-use super::search::{Found, Noise};
-use super::simulation::{Runs, dot};
+use super::Estimate;
+use super::cholesky::{Lower, Symmetric};
+use super::parameters::{Unknown, Unknowns};
+use super::readings::{Precision, Runs, dot};
+use super::search::{Found, derivatives};
 
 /// Lags over which autocorrelation is summed at most.
 const LAGS_MAX: usize = 400;
 
-/// Covariance of all unknowns in the units of their values; infinite where they were not searched.
-#[derive(Clone, Debug)]
-pub(super) struct Covariance(Symmetric);
+/// γ from which a run's residuals are not white.
+const NOT_WHITE: f64 = 1.35;
+
+/// Powers of the inverse for its greatest direction.
+const POWERS: usize = 12;
+
+/// Samples that intervals are read from: their ends are good to a thirtieth.
+const SAMPLES: usize = 2000;
 
 /// γ of one run's residuals, at least 1.
-pub(super) fn correlation_factor(residuals: &[f64]) -> f64 {
+fn correlation_factor(residuals: &[f64]) -> f64 {
     let power = dot(residuals, residuals);
     if !(power > 0.0) {
         return 1.0;
@@ -28,52 +41,136 @@ pub(super) fn correlation_factor(residuals: &[f64]) -> f64 {
     1.0 + 2.0 * correlations.take_while(|&correlation| correlation > 0.0).sum::<f64>()
 }
 
-/// The covariance of what a search found; `None` if it found nothing that can be linearised.
-pub(super) fn covariance(runs: &Runs, resolution_mm: f64, found: &Found) -> Option<Covariance> {
-    let unknowns = &found.unknowns;
-    let linear = found.linear.as_ref()?;
-    let free = &linear.free;
-    let noise = Noise::of(runs, &found.residuals, resolution_mm).careful();
-    let mut information = linear.normal(&noise.weights());
-    for (index, unknown) in free.iter().enumerate() {
-        // An unknown that no run shows ends with this width, far beyond what counts as determined.
-        *information.at_mut(index, index) += unknown.ignorance().powi(-2);
+/// What else recordings allow than what was found.
+#[derive(Clone, Debug)]
+pub(super) struct Confidence {
+    best: Unknowns,
+    samples: Vec<Unknowns>,
+    /// What intervals are to be multiplied by.
+    widening: f64,
+}
+
+/// The confidence of what a search over the `free` unknowns found, with weights that are up to date; `None` if it
+/// can't be linearised.
+pub(super) fn confidence(
+    runs: &mut Runs,
+    found: &Found,
+    free: &[Unknown],
+    substeps: u32,
+    left: f64,
+) -> Option<Confidence> {
+    let whitened = runs.weights(Precision::LAST).whitened(&found.residuals);
+    let factors: Vec<f64> = whitened.iter().map(|run| correlation_factor(run)).collect();
+    // A remainder that counts as a whole counts once.
+    let not_white = if left > 0.0 { f64::INFINITY } else { NOT_WHITE };
+    let counted: Vec<f64> =
+        factors.iter().map(|&factor| if factor > not_white { factor } else { 1.0 }).collect();
+    runs.inflate(&counted);
+    let weights = runs.weights(Precision::LAST);
+    let lag_limit_s = runs.lag_limit_s();
+    let mut chance = Chance(0x1DE7);
+    let mut samples = Vec::new();
+    let mut least_misfit = f64::INFINITY;
+    for centre in [found.unknowns].iter().chain(&found.rivals) {
+        let (columns, residuals) = derivatives(runs, centre, free, substeps)?;
+        let misfit: f64 = weights.misfits(&residuals).iter().sum();
+        least_misfit = least_misfit.min(misfit);
+        let mut information = weights.sums(&columns, &residuals).normal;
+        for (index, unknown) in free.iter().enumerate() {
+            // An unknown that no run shows ends with this width, far beyond what counts as determined.
+            *information.at_mut(index, index) += unknown.ignorance().powi(-2);
+        }
+        let factor = inverse_factor(&information)?;
+        let sample = |_| {
+            let normal: Vec<f64> = free.iter().map(|_| chance.normal()).collect();
+            let steps = factor.times(&normal);
+            let mut sample = *centre;
+            for (&unknown, step) in free.iter().zip(steps) {
+                sample = sample.shifted(unknown, step);
+            }
+            sample.bounded(free, lag_limit_s)
+        };
+        // By the likelihood of the valley.
+        let share = (-0.5 * (misfit - least_misfit).max(0.0)).exp();
+        samples.extend((0..(share * SAMPLES as f64) as usize).map(sample));
     }
-    // Scaled to a diagonal of 1 for the inversion.
+    Some(Confidence { best: found.unknowns, samples, widening: 1.0 + left.max(0.0).sqrt() / 1.96 })
+}
+
+/// One standard deviation along the direction that the recordings fix worst, in the coordinates of the `free`
+/// unknowns.
+pub(super) fn floor(runs: &Runs, found: &Found, free: &[Unknown], substeps: u32) -> Option<Vec<f64>> {
+    let (columns, residuals) = derivatives(runs, &found.unknowns, free, substeps)?;
+    let mut information = runs.weights(Precision::LAST).sums(&columns, &residuals).normal;
+    // What no run shows has no floor.
+    for (index, unknown) in free.iter().enumerate() {
+        let least = unknown.ignorance().powi(-2);
+        if information.at(index, index) < least {
+            *information.at_mut(index, index) = 1e12 * least;
+        }
+    }
     let scale: Vec<f64> = (0..free.len()).map(|index| information.at(index, index).sqrt().recip()).collect();
     let mut scaled = Symmetric::zero(free.len());
     for row in 0..free.len() {
         for column in 0..free.len() {
             *scaled.at_mut(row, column) = information.at(row, column) * scale[row] * scale[column];
         }
+        *scaled.at_mut(row, row) *= 1.0 + 1e-12;
     }
-    let inverse = scaled.inverse()?;
-    let mut covariance = Symmetric::zero(COUNT);
-    for index in 0..COUNT {
-        *covariance.at_mut(index, index) = f64::INFINITY;
+    // Powers of the inverse turn any vector into its greatest direction.
+    let mut direction = vec![1.0; free.len()];
+    let mut length = 1.0;
+    for _ in 0..POWERS {
+        direction = scaled.solve(&direction)?;
+        length = dot(&direction, &direction).sqrt();
+        direction.iter_mut().for_each(|part| *part /= length);
     }
-    let unit: Vec<f64> =
-        free.iter().zip(&scale).map(|(&unknown, scale)| unknowns.deviation(unknown, *scale)).collect();
-    for (row, &left) in free.iter().enumerate() {
-        for (column, &right) in free.iter().enumerate() {
-            *covariance.at_mut(left as usize, right as usize) =
-                inverse.at(row, column) * unit[row] * unit[column];
-        }
-    }
-    Some(Covariance(covariance))
+    Some(direction.iter().zip(&scale).map(|(part, scale)| part * scale * length.sqrt()).collect())
 }
 
-impl Covariance {
-    /// Standard deviation of one unknown.
-    pub(super) fn deviation(&self, unknown: Unknown) -> f64 {
-        self.0.at(unknown as usize, unknown as usize).sqrt()
+/// A factor of the inverse: L⁻ᵀ scaled, so that L⁻ᵀ·(normal numbers) have the covariance.
+fn inverse_factor(information: &Symmetric) -> Option<Lower> {
+    let n = information.order();
+    // Scaled to a diagonal of 1 for the inversion.
+    let scale: Vec<f64> = (0..n).map(|index| information.at(index, index).sqrt().recip()).collect();
+    let mut scaled = Symmetric::zero(n);
+    for row in 0..n {
+        for column in 0..n {
+            *scaled.at_mut(row, column) = information.at(row, column) * scale[row] * scale[column];
+        }
+        *scaled.at_mut(row, row) *= 1.0 + 1e-12;
+    }
+    let mut factor = scaled.inverse()?.factor()?;
+    factor.scale_rows(&scale);
+    Some(factor)
+}
+
+impl Confidence {
+    /// A value with its interval; `of` makes it from the unknowns.
+    pub(super) fn estimate(&self, of: impl Fn(&Unknowns) -> f64) -> Estimate {
+        let value = of(&self.best);
+        let mut off: Vec<f64> = self.samples.iter().map(|sample| (of(sample) - value).abs()).collect();
+        off.sort_by(f64::total_cmp);
+        Estimate { value, half_width_95: self.widening * off[off.len() * 95 / 100] }
+    }
+}
+
+/// Random numbers that are the same every time: SplitMix64.
+struct Chance(u64);
+
+impl Chance {
+    fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut bits = self.0;
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((bits ^ (bits >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Standard deviation of the difference of two unknowns.
-    pub(super) fn deviation_of_difference(&self, left: Unknown, right: Unknown) -> f64 {
-        let (left, right) = (left as usize, right as usize);
-        let square = self.0.at(left, left) + self.0.at(right, right) - 2.0 * self.0.at(left, right);
-        square.max(0.0).sqrt()
+    /// By Box and Muller, one of the two.
+    fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
+        radius * (core::f64::consts::TAU * self.unit()).cos()
     }
 }
 
@@ -95,5 +192,23 @@ mod tests {
         assert!((1.0..1.3).contains(&correlation_factor(&alone)));
         assert!((8.0..13.0).contains(&correlation_factor(&standing)));
         assert_eq!(correlation_factor(&[0.0; 10]), 1.0);
+    }
+
+    #[test]
+    fn samples_have_the_covariance() {
+        let mut information = Symmetric::zero(2);
+        for (row, column, value) in [(0, 0, 4.0), (1, 1, 100.0), (0, 1, 10.0), (1, 0, 10.0)] {
+            *information.at_mut(row, column) = value;
+        }
+        let factor = inverse_factor(&information).expect("positive");
+        let mut chance = Chance(1);
+        let (mut first, mut both) = (0.0, 0.0);
+        for _ in 0..20_000 {
+            let sample = factor.times(&[chance.normal(), chance.normal()]);
+            first += sample[0] * sample[0] / 20_000.0;
+            both += sample[0] * sample[1] / 20_000.0;
+        }
+        // The inverse is (100, −10; −10, 4)/300.
+        assert!((first * 3.0 - 1.0).abs() < 0.05 && (both * 30.0 + 1.0).abs() < 0.05, "{first} {both}");
     }
 }

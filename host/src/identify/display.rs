@@ -7,6 +7,19 @@ use super::{AxisParametersFound, BedEstimate, Estimate, Figures, Identification,
 impl Display for Identification {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         write!(f, "{}", self.parameters)?;
+        let each = self.misfit_per_reading;
+        if self.is_met() {
+            writeln!(
+                f,
+                "\nWhat is left has {each:.2} times the square of the readings' errors: the model explains the runs."
+            )?;
+        } else {
+            writeln!(
+                f,
+                "\nWhat is left has {each:.1} times the square of the readings' errors: the axis has something that the \
+                 model lacks.\nIntervals are as wide as that allows."
+            )?;
+        }
         writeln!(f, "\nModel against recording, rms error of each run:")?;
         for (index, RunMatch { error_mm_rms, travel_mm }) in self.runs.iter().enumerate() {
             let number = index + 1;
@@ -31,7 +44,8 @@ impl Display for AxisParametersFound {
         )?;
         line(f, "dead time τ", self.dead_time_s.times(1e3), "ms", "first motion after a command")?;
         line(f, "current loop lag Tc", self.current_lag_s.times(1e3), "ms", "how motion sets in")?;
-        line(f, "total delay τ+Tc+T/2", self.total_delay_s.times(1e3), "ms", "all runs")?;
+        line(f, "command filter Tf", self.command_filter_s.times(1e3), "ms", "the first bend of a motion")?;
+        line(f, "total delay τ+Tf+Tc+T/2", self.total_delay_s.times(1e3), "ms", "all runs")?;
         line(
             f,
             "acceleration limit",

@@ -58,12 +58,10 @@ pub enum IdentifyError {
     },
     /// Commands without effect.
     #[error(
-        "run {run}: the axis moved {travel_mm} mm under commands that ask for {commanded_mm} mm; expected motion: \
+        "the axis moved {travel_mm} mm at most under commands that ask for {commanded_mm} mm; expected motion: \
          is the drive enabled, the encoder connected?"
     )]
     NeverMoved {
-        /// The recording's index.
-        run: usize,
         /// The difference of the greatest and the smallest reading \[mm\].
         travel_mm: f64,
         /// The same for the integral of the command \[mm\].

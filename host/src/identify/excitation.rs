@@ -6,10 +6,47 @@
 
 use core::f64::consts::PI;
 
-/// The fastest motion of the plan \[m/min\].
-const FASTEST_M_MIN: f64 = 9.549;
-/// And the part of what an axis reaches that it may take: drift and trim need some of the output, too.
+use super::differences::Parabolas;
+use super::recording::AxisRecording;
+
+/// The part of what an axis reaches that it may take: drift and trim need some of the output, too.
 const REACH_SHARE: f64 = 0.95;
+
+/// The fastest step of the plan \[mm/s\]: S4's fastest.
+const FASTEST_MM_S: f64 = 9549.0 / 60.0;
+/// And the time in which the axis gets there at its greatest acceleration \[s\].
+const RISE_S: f64 = 0.15;
+/// Each step over the next one.
+const STEP_RATIO: f64 = 4.0;
+const STEPS: i32 = 4;
+
+/// The velocity of the first look, over what the axis reaches.
+const FIRST_SHARE: f64 = 0.3;
+
+/// Harmonic motions \[Hz\]: for the friction, and for what moves at other frequencies.
+const SLOW_HZ: [f64; 1] = [3.0];
+const HARMONIC_HZ: [f64; 8] = [5.0, 8.0, 12.0, 18.0, 28.0, 45.0, 70.0, 110.0];
+/// Time of one of them \[s\], and the least and greatest number of periods.
+const HARMONIC_S: f64 = 0.45;
+const PERIODS: (f64, f64) = (4.0, 40.0);
+/// The part of the greatest acceleration that they take.
+const HARMONIC_ACCEL: f64 = 0.4;
+/// The slow ones' velocity, over the steps'.
+const SLOW_SHARE: f64 = 0.15;
+
+/// Ticks of the shortest period.
+const PERIOD_TICKS_MIN: f64 = 10.0;
+
+/// What an axis can do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reach {
+    /// Control tick \[s\], > 0.
+    pub tick_s: f64,
+    /// Velocity \[mm/s\], > 0.
+    pub fastest_mm_s: f64,
+    /// Acceleration \[mm/s²\], > 0: about what its drive gives it.
+    pub accel_mm_s2: f64,
+}
 
 /// A motion of one axis about its starting point, as the commanded velocity over time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,33 +71,71 @@ pub enum Excitation {
     },
 }
 
-/// The motions to run, in any order: about 9 s of machine time and 50 mm of travel to one side.
-///
-/// They were chosen for axes like those of S4 (Kv 300 … 600 /s, 8 … 16 m/s², bed at 9 … 18 Hz), which are
-/// faster than the plan. An axis that reaches no more than `fastest_mm_s` \[mm/s\], > 0, gets all of it
-/// slower in proportion.
+/// The first look at an axis that reaches `fastest_mm_s` \[mm/s\], > 0, and of which nothing else is known.
 #[must_use]
-pub fn identification_plan(fastest_mm_s: f64) -> Vec<Excitation> {
-    let part = (REACH_SHARE * fastest_mm_s / (FASTEST_M_MIN * 1000.0 / 60.0)).min(1.0);
-    let per_minute = |m_min: f64| part * m_min * 1000.0 / 60.0;
-    let harmonic = |feed_m_min, frequency_hz, periods| Excitation::Harmonic {
-        amplitude_mm_s: per_minute(feed_m_min),
+pub fn first_look(fastest_mm_s: f64) -> Excitation {
+    let feed_mm_s = (FIRST_SHARE * fastest_mm_s).min(FASTEST_MM_S);
+    Excitation::Steps { feed_mm_s, cruise_s: 0.4, rest_s: 0.2 }
+}
+
+/// The motions to run, in any order: about 10 s of machine time and 70 mm of travel to one side.
+///
+/// They are as fast as the axis bears: the greatest step reaches the current limit, the smallest of four does not,
+/// and harmonic motion stays within two fifths of it.
+#[must_use]
+pub fn identification_plan(reach: &Reach) -> Vec<Excitation> {
+    let &Reach { tick_s, fastest_mm_s, accel_mm_s2 } = reach;
+    let step_mm_s = FASTEST_MM_S.min(REACH_SHARE * fastest_mm_s).min(RISE_S * accel_mm_s2);
+    let steps = (0..STEPS).map(|step| {
+        let feed_mm_s = step_mm_s / STEP_RATIO.powi(step);
+        let cruise_s = 0.2 + 1.5 * feed_mm_s / accel_mm_s2;
+        Excitation::Steps { feed_mm_s, cruise_s, rest_s: 0.15 }
+    });
+    let harmonic = |frequency_hz: f64, most_mm_s: f64| Excitation::Harmonic {
+        amplitude_mm_s: (HARMONIC_ACCEL * accel_mm_s2 / (2.0 * PI * frequency_hz)).min(most_mm_s),
         frequency_hz,
-        periods,
+        // Whole and small.
+        periods: (HARMONIC_S * frequency_hz).round().clamp(PERIODS.0, PERIODS.1) as u32,
     };
-    vec![
-        Excitation::Steps { feed_mm_s: per_minute(1.0), cruise_s: 0.25, rest_s: 0.1 },
-        Excitation::Steps { feed_mm_s: per_minute(7.2), cruise_s: 0.4, rest_s: 0.1 },
-        Excitation::Steps { feed_mm_s: per_minute(FASTEST_M_MIN), cruise_s: 0.3, rest_s: 0.1 },
-        harmonic(0.12, 2.0, 3),
-        harmonic(7.2, 3.0, 4),
-        harmonic(2.150, 4.0, 4),
-        harmonic(2.150, 10.0, 6),
-        harmonic(2.150, 13.0, 9),
-        harmonic(2.150, 20.0, 8),
-        harmonic(2.150, 40.0, 14),
-        harmonic(FASTEST_M_MIN, 16.0, 6),
-    ]
+    let slow = SLOW_HZ.into_iter().map(|hz| harmonic(hz, SLOW_SHARE * step_mm_s));
+    let highest_hz = 1.0 / (PERIOD_TICKS_MIN * tick_s);
+    let fast = HARMONIC_HZ.into_iter().filter(|hz| *hz <= highest_hz).map(|hz| harmonic(hz, 0.5 * step_mm_s));
+    steps.chain(slow).chain(fast).collect()
+}
+
+/// Records an axis by `record`: a first look, and then what [`identification_plan`] asks of it.
+///
+/// # Errors
+/// Those of `record`.
+pub fn explore<E>(
+    tick_s: f64,
+    fastest_mm_s: f64,
+    mut record: impl FnMut(&Excitation) -> Result<AxisRecording, E>,
+) -> Result<Vec<AxisRecording>, E> {
+    let mut runs = vec![record(&first_look(fastest_mm_s))?];
+    let accel_mm_s2 = accel_mm_s2(&runs[0]);
+    for excitation in identification_plan(&Reach { tick_s, fastest_mm_s, accel_mm_s2 }) {
+        runs.push(record(&excitation)?);
+    }
+    Ok(runs)
+}
+
+/// The greatest acceleration of a run \[mm/s²\], over a time in which the encoder shows it.
+fn accel_mm_s2(run: &AxisRecording) -> f64 {
+    let begins = run.command_mm_s.iter().position(|command| *command != run.rest_mm_s()).unwrap_or(0);
+    let most = |parabolas: Parabolas, positions: &[f64]| {
+        parabolas.of(positions).map(|(_, _, accel)| accel.abs()).fold(0.0, f64::max)
+    };
+    let mut found = 0.0;
+    for time_s in [5e-3, 10e-3, 20e-3, 40e-3] {
+        let parabolas = Parabolas::over(time_s, run.tick_s);
+        found = most(parabolas, &run.actual_mm);
+        if most(parabolas, &run.actual_mm[..begins]) < 0.1 * found {
+            break;
+        }
+    }
+    // An axis that did not move may still be asked for a little.
+    f64::max(found, 10.0)
 }
 
 impl Excitation {
@@ -114,13 +189,13 @@ mod tests {
     fn the_plan_is_short_and_stays_within_its_travel() {
         let tick_s = 0.5e-3;
         let mut time_s = 0.0;
-        for excitation in identification_plan(f64::INFINITY) {
+        for excitation in identification_plan(&Reach { tick_s, fastest_mm_s: 333.0, accel_mm_s2: 12_300.0 }) {
             let velocity = excitation.velocity_mm_s(tick_s);
             time_s += velocity.len() as f64 * tick_s;
             let mut position_mm: f64 = 0.0;
             for v in &velocity {
                 position_mm += v * tick_s;
-                assert!((-10.0..=50.0).contains(&position_mm), "{excitation:?}: {position_mm} mm");
+                assert!((-10.0..=70.0).contains(&position_mm), "{excitation:?}: {position_mm} mm");
             }
             assert!(velocity[0].abs() < 1e-12 && velocity.last().unwrap().abs() < 1.0, "{excitation:?}");
         }
@@ -130,7 +205,8 @@ mod tests {
     #[test]
     fn a_slow_axis_gets_what_it_reaches() {
         let greatest_mm_s = |fastest_mm_s: f64| {
-            let motions = identification_plan(fastest_mm_s);
+            let reach = Reach { tick_s: 0.5e-3, fastest_mm_s, accel_mm_s2: 12_300.0 };
+            let motions = identification_plan(&reach);
             let velocities = motions.iter().flat_map(|motion| motion.velocity_mm_s(0.5e-3));
             velocities.fold(0.0, f64::max)
         };
@@ -138,5 +214,23 @@ mod tests {
             assert!((greatest_mm_s(fastest_mm_s) - REACH_SHARE * fastest_mm_s).abs() < 1e-9);
         }
         assert!((greatest_mm_s(1000.0) - 159.15).abs() < 1e-9);
+    }
+
+    /// Steps saturate a drive for 0.15 s at most, and harmonic motion never does.
+    #[test]
+    fn a_weak_axis_gets_what_it_bears() {
+        for accel_mm_s2 in [300.0, 3000.0] {
+            let reach = Reach { tick_s: 0.5e-3, fastest_mm_s: 333.0, accel_mm_s2 };
+            for motion in identification_plan(&reach) {
+                match motion {
+                    Excitation::Steps { feed_mm_s, .. } => assert!(feed_mm_s <= RISE_S * accel_mm_s2 + 1e-9),
+                    Excitation::Harmonic { amplitude_mm_s, frequency_hz, .. } => {
+                        assert!(
+                            2.0 * PI * frequency_hz * amplitude_mm_s <= HARMONIC_ACCEL * accel_mm_s2 + 1e-9
+                        );
+                    }
+                }
+            }
+        }
     }
 }

@@ -1,27 +1,42 @@
 //! The fit of the drive model, in stages: from a coarse grid on the steps to everything on all runs, and the
 //! question whether there is a bed.
+//!
+//! A search ends in the nearest valley. So several are made, and the deepest end counts. Whether that is the
+//! right one can be seen: a right model leaves the errors of the readings and nothing else.
 
-use super::confidence::covariance;
+use super::bed::likely_beds;
+use super::cholesky::Symmetric;
+use super::confidence::{Confidence, confidence, floor};
 use super::differences::Parabolas;
-use super::parameters::{ALL, COUNT, Unknown, Unknowns, without_bed};
+use super::estimate::MET;
+use super::parameters::{ALL, Unknown, Unknowns, without_bed};
+use super::readings::{Precision, Runs, dot};
 use super::recording::{AxisRecording, span};
-use super::search::{Effort, Found, Noise, search};
-use super::simulation::{Residuals, Runs, SUBSTEPS, dot};
+use super::search::{Effort, Found, search};
+use super::simulation::SUBSTEPS;
 use super::{AxisParametersFound, BedEstimate, Estimate, IdentifyError, RunMatch};
 
 /// Starts of the grid: velocity gain \[1/s\], integral time \[s\], lag \[ticks\] ...
-const GAINS_PER_S: [f64; 5] = [60.0, 150.0, 300.0, 600.0, 1200.0];
-const INTEGRAL_TIMES_S: [f64; 3] = [0.008, 0.025, 0.08];
-const LAGS_TICKS: [f64; 6] = [1.0, 2.0, 4.0, 8.0, 16.0, 32.0];
-/// ... and current limit over the greatest acceleration, in which friction and bed may have helped.
-const LIMITS: [f64; 2] = [0.8, 1.02];
+const GAINS_PER_S: [f64; 6] = [18.0, 40.0, 90.0, 200.0, 450.0, 1000.0];
+const INTEGRAL_TIMES_S: [f64; 4] = [0.006, 0.02, 0.07, 0.25];
+const LAGS_TICKS: [f64; 5] = [1.0, 3.0, 6.0, 12.0, 30.0];
+/// ... current limit over the greatest acceleration, in which friction and bed may have helped ...
+const LIMITS: [f64; 2] = [0.85, 1.2];
+/// ... and Coulomb friction over it.
+const FRICTIONS: [f64; 2] = [0.01, 0.2];
 
-/// Starts that are followed.
-const STARTS: usize = 3;
+/// Current limits that are tried over the greatest acceleration before every stage: above what the model asks for a
+/// limit does nothing, and a search that has gone there does not come back.
+const TRIED_LIMITS: [f64; 11] = [0.6, 0.7, 0.8, 0.87, 0.93, 1.0, 1.07, 1.15, 1.3, 1.6, 3.0];
+
+/// Starts that are followed: on the steps, and of those on all runs.
+const FOLLOWED: usize = 6;
+const CONTINUED: usize = 2;
 
 /// Unknowns of the first stage.
-const COARSE: [Unknown; 6] = [
+const COARSE: [Unknown; 7] = [
     Unknown::Gain,
+    Unknown::Offset,
     Unknown::VelocityGain,
     Unknown::IntegralTime,
     Unknown::Lag,
@@ -29,21 +44,47 @@ const COARSE: [Unknown; 6] = [
     Unknown::Coulomb,
 ];
 
-const COARSE_EFFORT: Effort = Effort { substeps: 5, jacobians: 5, is_near: false, least_gain: 20.0 };
+const GRID: Precision = Precision { substeps: 3, slack: 1e-2 };
+const COARSE_EFFORT: Effort =
+    Effort { precision: Precision { substeps: 4, slack: 5e-3 }, jacobians: 8, least_gain: 1.0 };
+const ROUGH_EFFORT: Effort =
+    Effort { precision: Precision { substeps: 5, slack: 2e-3 }, jacobians: 12, least_gain: 1.0 };
 const MIDDLE_EFFORT: Effort =
-    Effort { substeps: SUBSTEPS / 2, jacobians: 12, is_near: false, least_gain: 100.0 };
-const LAST_EFFORT: Effort = Effort { substeps: SUBSTEPS, jacobians: 5, is_near: true, least_gain: 2.0 };
+    Effort { precision: Precision { substeps: 10, slack: 2e-4 }, jacobians: 12, least_gain: 1.0 };
+const FINE_EFFORT: Effort =
+    Effort { precision: Precision { substeps: SUBSTEPS, slack: 5e-5 }, jacobians: 6, least_gain: 1.0 };
+const LAST_EFFORT: Effort = Effort { precision: Precision::LAST, jacobians: 25, least_gain: 0.02 };
 
-/// A bed must raise the likelihood as much as chance does in one of e³⁰ cases, ...
-const BED_GAIN: f64 = 60.0;
-/// ... explain a share of all residuals that the model's own roughness can't, ...
-const BED_GAIN_PER_READING: f64 = 0.02;
-/// ... and have a mass ratio of this many standard deviations.
-const BED_DEVIATIONS: f64 = 4.0;
+const EXCHANGED_EFFORT: Effort = Effort { precision: Precision::LAST, jacobians: 4, least_gain: 10.0 };
+/// A valley that is this much worse after a few steps is left; one that is this much worse at its end is a rival,
+/// which chance prefers in one of a hundred cases.
+const NEAR: f64 = 3e4;
+const RIVAL: f64 = 9.0;
+/// Kicks along the floor, in standard deviations, and the gain in misfit for which what follows is searched.
+const KICKS: [f64; 4] = [-30.0, -9.0, 9.0, 30.0];
+const KICKED_EFFORT: Effort = Effort { precision: Precision::LAST, jacobians: 2, least_gain: 10.0 };
+const KICK_GAIN: f64 = 0.5;
+const SETTLING_EFFORT: Effort = Effort { jacobians: 5, ..LAST_EFFORT };
 
-/// Gain in misfit for each reading from which a bed needs no comparison at full effort: it halves the errors,
-/// more than coarser sub-steps can.
-const OBVIOUS: f64 = 1.4;
+/// Beds that are followed.
+const BEDS: usize = 3;
+/// Promised gain in misfit from which a bed is searched for.
+const PROMISE: f64 = 12.0;
+/// Beds that are tried where the rigid model is no guide: frequencies \[Hz\], damping and mass ratio, and Jacobians.
+const OTHER_BEDS_HZ: [f64; 9] = [5.5, 8.0, 12.0, 17.0, 25.0, 36.0, 52.0, 75.0, 108.0];
+const OTHER_BED: (f64, f64) = (0.03, 0.05);
+const OTHER_JACOBIANS: usize = 3;
+const OTHERS: usize = 2;
+
+/// A bed must lower the misfit by what its three unknowns are worth by themselves, three logarithms of the number of
+/// readings (Schwarz), and by as much again as chance does in one of e¹⁵ cases.
+const BED_GAIN: f64 = 30.0;
+
+/// Two searches for one minimum end this far apart: positions are stairs where the limit acts, if low ones.
+const STAIRS: f64 = 10.0;
+
+/// Mass ratio of a bed without which nothing followed.
+const CERTAIN_RATIO: f64 = 1e-3;
 
 /// Root mean square of the residuals over the travel, above which the model is none.
 const MISS_MAX: f64 = 0.05;
@@ -51,131 +92,339 @@ const MISS_MAX: f64 = 0.05;
 pub(super) struct Fit {
     pub(super) parameters: AxisParametersFound,
     pub(super) runs: Vec<RunMatch>,
+    pub(super) misfit_per_reading: f64,
 }
 
 /// Fits the model to checked recordings.
 pub(super) fn fit(recordings: &[AxisRecording], resolution_mm: f64) -> Result<Fit, IdentifyError> {
-    let runs = Runs::new(recordings);
-    let too_late = IdentifyError::TooLate { limit_s: runs.lag_limit_s() };
-    let start = coarse(recordings, resolution_mm)?.ok_or(too_late.clone())?;
-
-    let rigid = search(&runs, resolution_mm, start, without_bed(), MIDDLE_EFFORT).ok_or(too_late.clone())?;
-    let suspected = likeliest(&runs, resolution_mm, &rigid)
-        .and_then(|bed| search(&runs, resolution_mm, bed, &ALL, MIDDLE_EFFORT));
-    let is_obvious =
-        suspected.as_ref().is_some_and(|bed| gain_per_reading(&runs, resolution_mm, &rigid, bed) > OBVIOUS);
-    let with_bed = suspected.and_then(|bed| search(&runs, resolution_mm, bed.unknowns, &ALL, LAST_EFFORT));
-    let found = match with_bed {
-        Some(bed) if is_obvious && is_heavy(&runs, resolution_mm, &bed) => bed,
-        with_bed => {
-            let rigid = search(&runs, resolution_mm, rigid.unknowns, without_bed(), LAST_EFFORT)
-                .ok_or(too_late.clone())?;
-            with_bed.filter(|bed| is_bed(&runs, resolution_mm, &rigid, bed)).unwrap_or(rigid)
-        }
-    };
-    let matches = matches(&runs, recordings, &found.residuals)?;
-    let parameters = estimates(&runs, resolution_mm, &found, recordings[0].tick_s).ok_or(too_late)?;
-    Ok(Fit { parameters, runs: matches })
+    let mut search =
+        Stages { runs: Runs::new(recordings, resolution_mm), accel_mm_s2: sustained_accel_mm_s2(recordings) };
+    let too_late = IdentifyError::TooLate { limit_s: search.runs.lag_limit_s() };
+    let starts = coarse(recordings, resolution_mm)?;
+    let (found, free) = search.best(&starts).ok_or(too_late.clone())?;
+    settled(recordings, search.runs, found, free).ok_or(too_late)?
 }
 
-/// The first stage, on runs that are not harmonic if there are such: a grid, and a search from its best
-/// points.
-fn coarse(recordings: &[AxisRecording], resolution_mm: f64) -> Result<Option<Unknowns>, IdentifyError> {
+/// A model that was found, and its unknowns.
+type Model = (Found, &'static [Unknown]);
+
+struct Stages {
+    runs: Runs,
+    accel_mm_s2: f64,
+}
+
+impl Stages {
+    fn readings(&self) -> f64 {
+        self.runs.readings().sum()
+    }
+
+    /// One stage, with a current limit that acts.
+    fn stage(&self, start: Unknowns, free: &[Unknown], effort: Effort) -> Option<Found> {
+        search(&self.runs, limited(&self.runs, start, self.accel_mm_s2, effort.precision), free, effort)
+    }
+
+    /// The last two stages.
+    fn last(&self, start: Unknowns, free: &[Unknown]) -> Option<Found> {
+        let fine = self.stage(start, free, FINE_EFFORT)?;
+        let found = search(&self.runs, fine.unknowns, free, LAST_EFFORT)?;
+        self.kicked(self.with_rivals(found, free)?, free)
+    }
+
+    /// What was found, or better if the search had stopped on its way along the floor of a valley.
+    fn kicked(&self, found: Found, free: &[Unknown]) -> Option<Found> {
+        let floor = floor(&self.runs, &found, free, SUBSTEPS)?;
+        let lag_limit_s = self.runs.lag_limit_s();
+        let start = |deviations: &f64| {
+            let steps = free.iter().zip(&floor);
+            let moved = steps
+                .fold(found.unknowns, |start, (&unknown, step)| start.shifted(unknown, deviations * step));
+            moved.bounded(free, lag_limit_s)
+        };
+        let near = KICKS.iter().filter_map(|by| search(&self.runs, start(by), free, KICKED_EFFORT));
+        match least(near).filter(|near| near.misfit() < found.misfit() - KICK_GAIN) {
+            Some(near) => {
+                let last = search(&self.runs, near.unknowns, free, LAST_EFFORT)?;
+                Some(Found { rivals: found.rivals, ..last })
+            }
+            None => Some(found),
+        }
+    }
+
+    /// The least of what was found and of the valleys that answer alike; those that are hardly worse are its rivals.
+    fn with_rivals(&self, found: Found, free: &[Unknown]) -> Option<Found> {
+        let mut all: Vec<Found> = Vec::new();
+        for start in found.unknowns.exchanged() {
+            let near =
+                search(&self.runs, start.bounded(free, self.runs.lag_limit_s()), free, EXCHANGED_EFFORT);
+            let near = near.filter(|near| near.misfit() < found.misfit() + NEAR);
+            all.extend(near.and_then(|near| search(&self.runs, near.unknowns, free, LAST_EFFORT)));
+        }
+        all.push(found);
+        all.sort_by(|a, b| a.misfit().total_cmp(&b.misfit()));
+        let mut all = all.into_iter();
+        let mut best = all.next()?;
+        let is_rival = |other: &Found| other.misfit() < best.misfit() + RIVAL;
+        best.rivals = all.filter(is_rival).map(|other| other.unknowns).collect();
+        Some(best)
+    }
+
+    fn best(&mut self, starts: &[Unknowns]) -> Option<Model> {
+        let rough = least(starts.iter().filter_map(|start| self.stage(*start, without_bed(), ROUGH_EFFORT)))?;
+        self.runs.regroup(&rough.unknowns, ROUGH_EFFORT.precision.substeps);
+        let middle = self.stage(rough.unknowns, without_bed(), MIDDLE_EFFORT)?;
+        let is_rigid = middle.misfit() < MET * self.readings();
+        let model = if is_rigid { self.rigid_first(&middle) } else { self.bed_first(&middle) }?;
+        if self.is_met(&model) {
+            return Some(model);
+        }
+        match self.other_beds(starts) {
+            Some(other) if other.misfit() < model.0.misfit() => Some((other, &ALL)),
+            _ => Some(model),
+        }
+    }
+
+    fn is_met(&self, (found, _): &Model) -> bool {
+        found.misfit() < MET * self.readings()
+    }
+
+    /// Whether the misfits tell a bed from chance.
+    fn is_bed(&self, rigid: &Found, bed: &Found) -> bool {
+        let each = (bed.misfit() / self.readings()).max(1.0);
+        (rigid.misfit() - bed.misfit()) / each > 3.0 * self.readings().ln() + BED_GAIN
+    }
+
+    /// Where the rigid model follows in the middle: a bed, if its remainder promises one.
+    fn rigid_first(&mut self, middle: &Found) -> Option<Model> {
+        self.runs.regroup(&middle.unknowns, SUBSTEPS);
+        let rigid = self.last(middle.unknowns, without_bed())?;
+        let starts = likely_beds(&self.runs, &rigid, Precision::LAST);
+        // What is promised is linear; a search may find more.
+        let promising = starts.into_iter().take(BEDS).filter(|(_, gain)| *gain > PROMISE);
+        let bed = least(promising.filter_map(|(start, _)| search(&self.runs, start, &ALL, LAST_EFFORT)));
+        Some(match bed.and_then(|bed| self.with_rivals(bed, &ALL)) {
+            Some(bed) if self.is_bed(&rigid, &bed) => (bed, &ALL),
+            _ => (rigid, without_bed()),
+        })
+    }
+
+    /// Where it does not: beds first.
+    fn bed_first(&mut self, middle: &Found) -> Option<Model> {
+        let starts = likely_beds(&self.runs, middle, MIDDLE_EFFORT.precision);
+        let followed = starts.into_iter().take(BEDS);
+        let Some(bed) = least(followed.filter_map(|(start, _)| self.stage(start, &ALL, MIDDLE_EFFORT)))
+        else {
+            return self.rigid_first(middle);
+        };
+        self.runs.regroup(&bed.unknowns, SUBSTEPS);
+        let bed = self.last(bed.unknowns, &ALL)?;
+        let mut start = bed.unknowns;
+        start.set(Unknown::BedMassRatio, 0.0);
+        let beside = search(&self.runs, start, without_bed(), EXCHANGED_EFFORT);
+        let beside = beside.filter(|beside| beside.misfit() < bed.misfit() + NEAR);
+        let is_met = bed.misfit() < MET * self.readings();
+        if is_met && bed.unknowns.get(Unknown::BedMassRatio) > CERTAIN_RATIO && beside.is_none() {
+            // The rigid model misses it by far, wherever it starts.
+            return Some((bed, &ALL));
+        }
+        let beside = beside.and_then(|near| search(&self.runs, near.unknowns, without_bed(), LAST_EFFORT));
+        let rigid = least([self.last(middle.unknowns, without_bed()), beside].into_iter().flatten())?;
+        Some(if self.is_bed(&rigid, &bed) { (bed, &ALL) } else { (rigid, without_bed()) })
+    }
+
+    /// Where nothing follows: beds of all frequencies, from the start.
+    fn other_beds(&mut self, starts: &[Unknowns]) -> Option<Found> {
+        let effort = Effort { jacobians: OTHER_JACOBIANS, ..ROUGH_EFFORT };
+        let mut found: Vec<Found> = Vec::new();
+        for start in starts {
+            for frequency_hz in OTHER_BEDS_HZ {
+                let mut start = *start;
+                start.set(Unknown::BedFrequency, frequency_hz);
+                start.set(Unknown::BedDamping, OTHER_BED.0);
+                start.set(Unknown::BedMassRatio, OTHER_BED.1);
+                found.extend(self.stage(start, &ALL, effort));
+            }
+        }
+        found.sort_by(|a, b| a.misfit().total_cmp(&b.misfit()));
+        let followed = found.iter().take(OTHERS).filter_map(|found| {
+            let rough = search(&self.runs, found.unknowns, &ALL, ROUGH_EFFORT)?;
+            self.stage(rough.unknowns, &ALL, MIDDLE_EFFORT)
+        });
+        let middle = least(followed)?;
+        self.runs.regroup(&middle.unknowns, SUBSTEPS);
+        self.last(middle.unknowns, &ALL)
+    }
+}
+
+fn least(found: impl Iterator<Item = Found>) -> Option<Found> {
+    found.min_by(|a, b| a.misfit().total_cmp(&b.misfit()))
+}
+
+/// `start` with the current limit that fits best.
+fn limited(runs: &Runs, start: Unknowns, accel_mm_s2: f64, precision: Precision) -> Unknowns {
+    let with = |part: f64| {
+        let mut tried = start;
+        tried.set(Unknown::AccelLimit, part * accel_mm_s2);
+        tried
+    };
+    let tried: Vec<Unknowns> = [start].into_iter().chain(TRIED_LIMITS.map(with)).collect();
+    let weights = runs.weights(precision);
+    let judged = runs
+        .residuals(&tried, precision.substeps)
+        .into_iter()
+        .zip(tried)
+        .filter_map(|(residuals, tried)| Some((weights.misfits(&residuals?).iter().sum::<f64>(), tried)));
+    judged.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(start, |(_, best)| best)
+}
+
+/// The end: weights by what the model follows, and intervals.
+fn settled(
+    recordings: &[AxisRecording],
+    mut runs: Runs,
+    mut found: Found,
+    free: &[Unknown],
+) -> Option<Result<Fit, IdentifyError>> {
+    runs.regroup(&found.unknowns, SUBSTEPS);
+    let misfits = runs.weights(Precision::LAST).misfits(&found.residuals_of(&runs)?);
+    let readings: f64 = runs.readings().sum();
+    let misfit: f64 = misfits.iter().sum();
+    let is_met = misfit < MET * readings;
+    if is_met {
+        runs.rescale(&misfits);
+    }
+    let rivals = core::mem::take(&mut found.rivals);
+    found = search(&runs, found.unknowns, free, SETTLING_EFFORT)?;
+    found.rivals = rivals;
+    if let Some(simpler) = without_filter(&runs, &found, free) {
+        found = simpler;
+    }
+    let matches = match matches(&runs, recordings, &found) {
+        Ok(matches) => matches,
+        Err(error) => return Some(Err(error)),
+    };
+    let left = if is_met { 0.0 } else { misfit - readings };
+    let confidence = confidence(&mut runs, &found, free, SUBSTEPS, left)?;
+    let tick_s = recordings[0].tick_s;
+    Some(Ok(Fit {
+        parameters: estimates(&confidence, &found, tick_s),
+        runs: matches,
+        misfit_per_reading: misfit / readings,
+    }))
+}
+
+/// The same without a command filter, if that one unknown is not worth its logarithm of the number of readings
+/// (Schwarz), and what the stairs of the current limit may give it. What has the filter stays a rival, so intervals
+/// span both.
+fn without_filter(runs: &Runs, found: &Found, free: &[Unknown]) -> Option<Found> {
+    let others: Vec<Unknown> =
+        free.iter().copied().filter(|unknown| *unknown != Unknown::FilterSpread).collect();
+    let mut start = found.unknowns;
+    start.set(Unknown::FilterSpread, 0.0);
+    let simpler = search(runs, start, &others, SETTLING_EFFORT)?;
+    let readings: f64 = runs.readings().sum();
+    let is_enough = simpler.misfit() < found.misfit() + readings.ln() + STAIRS;
+    let rivals = || found.rivals.iter().copied().chain([found.unknowns]).collect();
+    is_enough.then(|| Found { rivals: rivals(), ..simpler })
+}
+
+/// The first stage, on runs that are not harmonic if there are such: a grid, and searches from its best
+/// points. The likeliest first.
+fn coarse(recordings: &[AxisRecording], resolution_mm: f64) -> Result<Vec<Unknowns>, IdentifyError> {
     let steps: Vec<AxisRecording> =
         recordings.iter().filter(|run| run.harmonic_hz.is_none()).cloned().collect();
     let chosen = if steps.is_empty() { recordings } else { &steps };
-    let runs = Runs::new(chosen);
-    let gain = slope(chosen);
+    let runs = Runs::new(chosen, resolution_mm);
+    let (gain, drift_mm_s) = slope_and_drift(chosen);
     let sustained_accel_mm_s2 = sustained_accel_mm_s2(chosen);
     if gain < 0.0 {
         return Err(IdentifyError::Reversed { slope: gain });
     }
-    let mut first = Unknowns([0.0; COUNT]);
+    let mut first = Unknowns::zero(chosen[0].tick_s / f64::from(SUBSTEPS));
     first.set(Unknown::Gain, gain.clamp(0.2, 5.0));
-    first.set(Unknown::Coulomb, 0.01 * sustained_accel_mm_s2);
+    first.set(Unknown::Offset, drift_mm_s);
     first.set(Unknown::Viscous, 0.05);
     first.set(Unknown::BedFrequency, 10.0);
-
-    let misfit =
-        |residuals: &Residuals| Noise::uncorrelated(&runs, residuals, resolution_mm).misfit(residuals);
     let mut starts = Vec::new();
     for velocity_gain_per_s in GAINS_PER_S {
-        for integral_time_s in INTEGRAL_TIMES_S {
-            for (lag_ticks, limit) in LAGS_TICKS.into_iter().flat_map(|lag| LIMITS.map(|limit| (lag, limit)))
-            {
-                let mut start = first;
-                let lag_s = lag_ticks * chosen[0].tick_s;
-                start.set(Unknown::AccelLimit, limit * sustained_accel_mm_s2);
-                start.set(Unknown::VelocityGain, velocity_gain_per_s);
-                start.set(Unknown::IntegralTime, integral_time_s);
-                start.set(Unknown::Lag, lag_s);
-                start.set(Unknown::CurrentLag, 0.2 * lag_s);
-                if let Some(residuals) = runs.residuals(&start, COARSE_EFFORT.substeps) {
-                    starts.push((misfit(&residuals), start));
+        for integral_time_s in
+            INTEGRAL_TIMES_S.into_iter().filter(|time_s| time_s * velocity_gain_per_s > 0.5)
+        {
+            for lag_s in LAGS_TICKS.map(|ticks| ticks * chosen[0].tick_s) {
+                for (limit, friction) in
+                    LIMITS.into_iter().flat_map(|limit| FRICTIONS.map(|part| (limit, part)))
+                {
+                    let mut start = first;
+                    start.set(Unknown::AccelLimit, limit * sustained_accel_mm_s2);
+                    start.set(Unknown::Coulomb, friction * sustained_accel_mm_s2);
+                    start.set(Unknown::VelocityGain, velocity_gain_per_s);
+                    start.set(Unknown::IntegralTime, integral_time_s);
+                    start.set(Unknown::Lag, lag_s);
+                    start.set(Unknown::CurrentLag, (0.2 * lag_s).min(0.3 / velocity_gain_per_s));
+                    starts.push(start);
                 }
             }
         }
     }
-    starts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let followed = starts.iter().take(STARTS);
-    let found =
-        followed.filter_map(|(_, start)| search(&runs, resolution_mm, *start, &COARSE, COARSE_EFFORT));
-    let best = found.min_by(|a, b| misfit(&a.residuals).total_cmp(&misfit(&b.residuals)));
-    Ok(best.map(|found| found.unknowns))
-}
-
-/// Change of position over change of the command's integral, over all runs.
-fn slope(recordings: &[AxisRecording]) -> f64 {
-    let (mut common, mut power) = (0.0, 0.0);
-    for run in recordings {
-        let commanded = run.commanded_mm();
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        let (actual_mean, commanded_mean) = (mean(&run.actual_mm), mean(&commanded));
-        for (actual, commanded) in run.actual_mm.iter().zip(&commanded) {
-            common += (actual - actual_mean) * (commanded - commanded_mean);
-            power += (commanded - commanded_mean).powi(2);
+    let results = runs.residuals(&starts, GRID.substeps);
+    let weights = runs.weights(GRID);
+    let mut judged: Vec<(f64, Unknowns)> = results
+        .into_iter()
+        .zip(starts)
+        .filter_map(|(residuals, start)| Some((weights.misfits(&residuals?).iter().sum(), start)))
+        .collect();
+    judged.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // Neighbours of the best end where the best ends.
+    let mut followed: Vec<Unknowns> = Vec::new();
+    for (_, start) in judged {
+        let is_other = |unknown: Unknown, other: &Unknowns| start.get(unknown) != other.get(unknown);
+        let is_new = followed
+            .iter()
+            .all(|other| is_other(Unknown::VelocityGain, other) || is_other(Unknown::IntegralTime, other));
+        if is_new {
+            followed.push(start);
+        }
+        if followed.len() == FOLLOWED {
+            break;
         }
     }
-    if power > 0.0 { common / power } else { 1.0 }
+    let mut found: Vec<Found> =
+        followed.into_iter().filter_map(|start| search(&runs, start, &COARSE, COARSE_EFFORT)).collect();
+    found.sort_by(|a, b| a.misfit().total_cmp(&b.misfit()));
+    Ok(found.into_iter().take(CONTINUED).map(|found| found.unknowns).collect())
 }
 
-/// A start with a bed, if one promises to be worth a search.
-fn likeliest(runs: &Runs, resolution_mm: f64, rigid: &Found) -> Option<Unknowns> {
-    super::bed::likeliest_bed(runs, resolution_mm, rigid, MIDDLE_EFFORT.substeps)
-        .filter(|(_, gain)| *gain > BED_GAIN)
-        .map(|(start, _)| start)
+/// How an axis without any lag would fit best: by its gain, and its velocity at command 0 \[mm/s\].
+///
+/// A run without a lag is off by a lag's travel in every one of its motions, and back after it.
+fn slope_and_drift(recordings: &[AxisRecording]) -> (f64, f64) {
+    let mut normal = Symmetric::zero(2);
+    let mut right = [0.0; 2];
+    for run in recordings {
+        let times_s: Vec<f64> = (0..run.actual_mm.len()).map(|tick| tick as f64 * run.tick_s).collect();
+        let centred = |values: &[f64]| {
+            let mean = values.iter().sum::<f64>() / values.len() as f64;
+            values.iter().map(|value| value - mean).collect::<Vec<f64>>()
+        };
+        let columns = [centred(&run.commanded_mm()), centred(&times_s)];
+        let actual = centred(&run.actual_mm);
+        for (row, column) in columns.iter().enumerate() {
+            right[row] += dot(column, &actual);
+            for (other, values) in columns.iter().enumerate() {
+                *normal.at_mut(row, other) += dot(column, values);
+            }
+        }
+    }
+    match normal.solve(&right).as_deref() {
+        Some(&[gain, drift_mm_s]) => (gain, drift_mm_s),
+        _ => (1.0, 0.0),
+    }
 }
 
-/// Gain in misfit by the bed for each reading, all of them taken as independent.
-fn gain_per_reading(runs: &Runs, resolution_mm: f64, rigid: &Found, bed: &Found) -> f64 {
-    let noise = Noise::uncorrelated(runs, &bed.residuals, resolution_mm);
-    (noise.misfit(&rigid.residuals) - noise.misfit(&bed.residuals)) / noise.independent()
-}
-
-/// Whether the recordings tell the two models apart.
-fn is_bed(runs: &Runs, resolution_mm: f64, rigid: &Found, bed: &Found) -> bool {
-    let noise = Noise::of(runs, &bed.residuals, resolution_mm);
-    let gain = noise.misfit(&rigid.residuals) - noise.misfit(&bed.residuals);
-    gain > BED_GAIN && gain > BED_GAIN_PER_READING * noise.independent() && is_heavy(runs, resolution_mm, bed)
-}
-
-/// Whether the bed's mass ratio differs from 0.
-fn is_heavy(runs: &Runs, resolution_mm: f64, bed: &Found) -> bool {
-    let ratio = bed.unknowns.get(Unknown::BedMassRatio);
-    covariance(runs, resolution_mm, bed)
-        .is_some_and(|covariance| ratio > BED_DEVIATIONS * covariance.deviation(Unknown::BedMassRatio))
-}
-
-fn matches(
-    runs: &Runs,
-    recordings: &[AxisRecording],
-    residuals: &Residuals,
-) -> Result<Vec<RunMatch>, IdentifyError> {
+fn matches(runs: &Runs, recordings: &[AxisRecording], found: &Found) -> Result<Vec<RunMatch>, IdentifyError> {
     let mut matches = Vec::with_capacity(recordings.len());
-    for ((recording, residuals), n) in recordings.iter().zip(residuals).zip(runs.readings()) {
-        let error_mm_rms = (dot(residuals, residuals) / n).sqrt();
+    for (recording, error_mm_rms) in recordings.iter().zip(runs.errors_mm_rms(&found.residuals)) {
         let travel_mm = span(&recording.actual_mm);
-        if !(error_mm_rms <= MISS_MAX * travel_mm) {
+        let resolution_mm = runs.resolution_mm();
+        if !(error_mm_rms <= MISS_MAX * travel_mm + 3.0 * resolution_mm) {
             return Err(IdentifyError::UnlikeModel {
                 run: matches.len() + 1,
                 error_mm: error_mm_rms,
@@ -187,31 +436,31 @@ fn matches(
     Ok(matches)
 }
 
-fn estimates(runs: &Runs, resolution_mm: f64, found: &Found, tick_s: f64) -> Option<AxisParametersFound> {
-    let unknowns = &found.unknowns;
-    let covariance = covariance(runs, resolution_mm, found)?;
-    let of = |unknown| Estimate::new(unknowns.get(unknown), covariance.deviation(unknown));
-    let (lag, current_lag) = (of(Unknown::Lag), of(Unknown::CurrentLag));
-    Some(AxisParametersFound {
+fn estimates(confidence: &Confidence, found: &Found, tick_s: f64) -> AxisParametersFound {
+    let of = |unknown: Unknown| confidence.estimate(|unknowns| unknowns.get(unknown));
+    let bed = (found.unknowns.get(Unknown::BedMassRatio) > 0.0).then(|| BedEstimate {
+        frequency_hz: of(Unknown::BedFrequency),
+        damping_ratio: of(Unknown::BedDamping),
+        mass_ratio: of(Unknown::BedMassRatio),
+    });
+    let delay_s = |unknowns: &Unknowns| {
+        unknowns.dead_time_s() + unknowns.filter_s() + unknowns.current_lag_s() + 0.5 * tick_s
+    };
+    AxisParametersFound {
         command_gain: of(Unknown::Gain),
         command_offset_mm_s: of(Unknown::Offset),
         velocity_gain_per_s: of(Unknown::VelocityGain),
         integral_time_s: of(Unknown::IntegralTime),
-        dead_time_s: Estimate::new(
-            lag.value - current_lag.value,
-            covariance.deviation_of_difference(Unknown::Lag, Unknown::CurrentLag),
-        ),
-        current_lag_s: current_lag,
-        total_delay_s: Estimate { value: lag.value + tick_s / 2.0, ..lag },
+        dead_time_s: confidence.estimate(Unknowns::dead_time_s),
+        command_filter_s: confidence.estimate(Unknowns::filter_s),
+        current_lag_s: confidence.estimate(Unknowns::current_lag_s),
+        total_delay_s: confidence.estimate(delay_s),
         accel_limit_mm_s2: of(Unknown::AccelLimit),
         coulomb_friction_mm_s2: of(Unknown::Coulomb),
         viscous_friction_per_s: of(Unknown::Viscous),
-        bed: (unknowns.get(Unknown::BedMassRatio) > 0.0).then(|| BedEstimate {
-            frequency_hz: of(Unknown::BedFrequency),
-            damping_ratio: of(Unknown::BedDamping),
-            mass_ratio: of(Unknown::BedMassRatio),
-        }),
-    })
+        load_inertia_ratio: Estimate { value: 0.0, half_width_95: f64::INFINITY },
+        bed,
+    }
 }
 
 /// The greatest acceleration that lasted for 5 ms in any run \[mm/s²\].

@@ -1,8 +1,8 @@
 //! Identification: the parameters of a servo axis, from recordings of outputs and encoder readings.
 //!
-//! Consumes [`AxisRecording`]s of the motions in [`identification_plan`], or of any others that start at
-//! rest, from an open or a closed loop; produces an [`Identification`]. Runs in the background of the PC, in
-//! about a second for ten seconds of recordings. It never sees the parameters of a simulation: a machine
+//! Consumes [`AxisRecording`]s of the motions that [`explore`] asks for, or of any others that start at rest, from an
+//! open or a closed loop; produces an [`Identification`]. Runs in the background of the PC, in two to five seconds
+//! of processor time for ten seconds of recordings. It never sees the parameters of a simulation: a machine
 //! gives the same two columns.
 //!
 //! Two methods:
@@ -13,20 +13,20 @@
 //!   positions are those that were recorded (output error, least squares). Noise of the encoder thus enters
 //!   once, is not differentiated, and does not bend the result.
 //!
-//! The model knows nothing of backlash, cogging and pitch errors. Where these matter, the error of the runs
-//! ([`RunMatch`]) stays far above the rounding of the encoder, and intervals are too narrow.
+//! The errors of the readings are known (`readings`, `moments`), so how well a model follows says whether it is
+//! the right one. The model knows nothing of backlash, cogging and pitch errors. Where these matter,
+//! [`Identification::misfit_per_reading`] is far above 1, and intervals are as wide as what is left allows.
 //!
 //! # Example
 //!
 //! ```
 //! use hal_sim::{DriveModel, DriveState, REFERENCE_X};
-//! use motion_host::identify::{AxisRecording, identification_plan, identify};
+//! use motion_host::identify::{AxisRecording, explore, identify};
 //!
 //! // In place of a machine.
 //! let tick_s = 0.5e-3;
 //! let model = DriveModel::new(REFERENCE_X, tick_s, 20)?;
-//! let mut runs = Vec::new();
-//! for excitation in identification_plan(333.0) {
+//! let runs = explore(tick_s, 333.0, |excitation| {
 //!     let mut axis = DriveState::<128>::at_rest(&model, 0.0)?;
 //!     let command_mm_s = excitation.velocity_mm_s(tick_s);
 //!     let mut latch = |command_mm_s: &f64| {
@@ -36,8 +36,8 @@
 //!     };
 //!     let actual_mm = command_mm_s.iter().map(&mut latch).collect();
 //!     let harmonic_hz = excitation.harmonic_hz();
-//!     runs.push(AxisRecording { tick_s, command_mm_s, actual_mm, lead_in_ticks: 0, harmonic_hz });
-//! }
+//!     Ok::<_, hal_sim::ParameterError>(AxisRecording { tick_s, command_mm_s, actual_mm, lead_in_ticks: 0, harmonic_hz })
+//! })?;
 //!
 //! let axis = identify(&runs)?;
 //! assert!((axis.parameters.velocity_gain_per_s.value - 440.0).abs() < 4.4);
@@ -55,6 +55,8 @@ mod harmonic_reading;
 mod parameters;
 mod simulation;
 mod cholesky;
+mod moments;
+mod readings;
 mod search;
 mod bed;
 mod confidence;
@@ -66,7 +68,7 @@ pub use error::IdentifyError;
 pub use estimate::{
     AxisParametersFound, BedEstimate, DETERMINED, Estimate, Figures, Identification, RunMatch,
 };
-pub use excitation::{Excitation, identification_plan};
+pub use excitation::{Excitation, Reach, explore, first_look, identification_plan};
 pub use harmonic_reading::{Bandwidth, HarmonicReading};
 pub use recording::AxisRecording;
 pub use step_reading::StepReading;
@@ -78,7 +80,12 @@ pub use step_reading::StepReading;
 pub fn identify(runs: &[AxisRecording]) -> Result<Identification, IdentifyError> {
     let figures = figures(runs)?;
     let fit = fit::fit(runs, figures.resolution_mm)?;
-    Ok(Identification { parameters: fit.parameters, figures, runs: fit.runs })
+    Ok(Identification {
+        parameters: fit.parameters,
+        figures,
+        runs: fit.runs,
+        misfit_per_reading: fit.misfit_per_reading,
+    })
 }
 
 /// The figures that need no model.
@@ -90,6 +97,7 @@ pub fn figures(runs: &[AxisRecording]) -> Result<Figures, IdentifyError> {
     for (index, run) in runs.iter().enumerate() {
         run.check(index + 1, first.tick_s)?;
     }
+    recording::check_motion(runs)?;
     let resolution_mm = recording::resolution_mm(runs);
     let harmonics: Vec<_> = runs.iter().filter_map(harmonic_reading::harmonic_reading).collect();
     Ok(Figures {

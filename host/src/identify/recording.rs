@@ -10,7 +10,7 @@ const TICKS_MIN: usize = 50;
 
 /// One run of one axis: what the converter put out and what the encoder read, tick by tick.
 ///
-/// The axis is at rest when it begins, with its command at 0 (within the drive's dead time before it).
+/// The axis is at rest when it begins, under the command it begins with: 0, or a trim that holds it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AxisRecording {
     /// Control tick \[s\], > 0; the same in all runs.
@@ -53,11 +53,12 @@ impl AxisRecording {
         if let Some(value) = self.harmonic_hz.filter(|hz| !(hz.is_finite() && *hz > 0.0)) {
             return Err(IdentifyError::NotFinite { run, quantity: "harmonic_hz", tick: 0, value });
         }
-        let (travel_mm, commanded_mm) = (span(actual_mm), span(&self.commanded_mm()));
-        if travel_mm < 0.1 * commanded_mm || travel_mm == 0.0 {
-            return Err(IdentifyError::NeverMoved { run, travel_mm, commanded_mm });
-        }
         Ok(())
+    }
+
+    /// The command of an axis at rest \[mm/s\]: what holds it, the trim included.
+    pub(super) fn rest_mm_s(&self) -> f64 {
+        self.command_mm_s.first().copied().unwrap_or_default()
     }
 
     /// The position of an axis without any lag at the start of each tick \[mm\].
@@ -70,6 +71,19 @@ impl AxisRecording {
         });
         travelled.collect()
     }
+}
+
+/// Checks that the axis moves at all; in some of the runs friction may hold it.
+pub(super) fn check_motion(runs: &[AxisRecording]) -> Result<(), IdentifyError> {
+    let (mut travel_mm, mut commanded_mm) = (0.0_f64, 0.0_f64);
+    for run in runs {
+        let (travelled_mm, asked_mm) = (span(&run.actual_mm), span(&run.commanded_mm()));
+        if travelled_mm > 0.0 && travelled_mm >= 0.1 * asked_mm {
+            return Ok(());
+        }
+        (travel_mm, commanded_mm) = (travel_mm.max(travelled_mm), commanded_mm.max(asked_mm));
+    }
+    Err(IdentifyError::NeverMoved { travel_mm, commanded_mm })
 }
 
 /// The difference of the greatest and the smallest value.
@@ -127,10 +141,10 @@ mod tests {
             of(&|run| run.actual_mm[7] = f64::INFINITY),
             Err(IdentifyError::NotFinite { run: 2, quantity: "actual_mm", tick: 7, value: f64::INFINITY })
         );
-        assert!(matches!(
-            of(&|run| run.actual_mm.fill(3.0)),
-            Err(IdentifyError::NeverMoved { run: 2, travel_mm: 0.0, .. })
-        ));
+        let mut still = recording();
+        still.actual_mm.fill(3.0);
+        assert_eq!(check_motion(&[still.clone(), recording()]), Ok(()));
+        assert!(matches!(check_motion(&[still]), Err(IdentifyError::NeverMoved { travel_mm: 0.0, .. })));
     }
 
     #[test]

@@ -1,185 +1,244 @@
-//! The runs as the search sees them: recordings, and the drive model's answers to the same commands.
+//! The drive model of hal-sim for several sets of unknowns at once.
+//!
+//! A search asks for a dozen neighbours of a set. Four that run side by side take the time of one and a half:
+//! a sub-step is a chain of operations that wait for each other.
+//!
+//! Equations and sub-steps are those of [`hal_sim::DriveModel`], but for one thing. There the integrator stops
+//! or runs for whole sub-steps while the current limit acts. Here it stops for the part of the sub-step in
+//! which the limit acts, so positions are smooth in every unknown and difference quotients are derivatives. What
+//! the model leaves out is a remainder of up to half a sub-step at every such moment. It stays in the axis'
+//! position, so [`readings`](super::readings) must know the moments.
 
-use hal_sim::{DriveModel, DriveState};
-
-use super::cholesky::Symmetric;
 use super::parameters::{Unknown, Unknowns};
-use super::recording::AxisRecording;
 
-/// Cells of the simulated dead time, one per sub-step.
-const LINE: usize = 1024;
+/// Sets of unknowns that are simulated side by side.
+pub(super) const LANES: usize = 4;
 
-/// Sub-steps of a tick in the last stage of the search: those of the reference machine. Stages before it are
-/// content with half of them.
+/// Sub-steps of a tick in the last stage of the search: those of the reference machine.
 pub(super) const SUBSTEPS: u32 = 20;
 
-/// The longest lag that is looked for \[ticks\]; the line has room for it.
-const LAG_TICKS_MAX: f64 = 50.0;
+/// Part of the limit within which its crossing is divided; steps of the command cross further.
+const CROSSING: f64 = 0.05;
 
-/// One run, prepared.
-#[derive(Clone, Debug)]
-struct Run {
-    command_mm_s: Vec<f64>,
-    /// The position relative to the first reading.
-    actual_mm: Vec<f64>,
-    /// Per tick; 0 in the lead-in.
-    weights: Vec<f64>,
-    weight_sum: f64,
+type Lane = [f64; LANES];
+
+/// Coefficients, as in [`hal_sim::DriveModel`].
+struct Model {
+    step_s: f64,
+    gain: Lane,
+    offset: Lane,
+    whole_ticks: [usize; LANES],
+    whole_steps: [u32; LANES],
+    fraction: Lane,
+    filter_share: Lane,
+    velocity_gain: Lane,
+    integral_gain: Lane,
+    limit: Lane,
+    current_share: Lane,
+    viscous_factor: Lane,
+    coulomb_step: Lane,
+    stiffness: Lane,
+    damping: Lane,
+    mass_ratio: Lane,
+    has_bed: bool,
 }
 
-/// All runs of an axis.
-#[derive(Clone, Debug)]
-pub(super) struct Runs {
-    tick_s: f64,
-    runs: Vec<Run>,
+#[derive(Default)]
+struct State {
+    command: Lane,
+    integral: Lane,
+    demand: Lane,
+    torque: Lane,
+    velocity: Lane,
+    position: Lane,
+    bed: Lane,
+    bed_velocity: Lane,
+    bed_accel: Lane,
+    is_frozen: bool,
 }
 
-/// Residuals of all runs: recorded − simulated, weighted, the mean of each run taken off.
-pub(super) type Residuals = Vec<Vec<f64>>;
-
-/// The model's output as a linear function of small steps in some unknowns.
-#[derive(Clone, Debug)]
-pub(super) struct Linearised {
-    pub(super) free: Vec<Unknown>,
-    /// The derivatives by run and by free unknown.
-    pub(super) columns: Vec<Vec<Vec<f64>>>,
-    /// JᵀJ by run.
-    pub(super) normals: Vec<Symmetric>,
+/// The fraction of the distance to its input that a lag covers in a step, to delay by `delay_s` in the mean.
+fn lag_share(step_s: f64, delay_s: f64) -> f64 {
+    step_s / (step_s + delay_s.max(0.0))
 }
 
-impl Run {
-    fn new(recording: &AxisRecording) -> Self {
-        let first_mm = recording.actual_mm.first().copied().unwrap_or_default();
-        let actual_mm: Vec<f64> = recording.actual_mm.iter().map(|position| position - first_mm).collect();
-        // A reading that stands has the same rounding error in every tick: all of them tell as much as one.
-        let mut weights = vec![0.0; actual_mm.len()];
-        let mut start = recording.lead_in_ticks;
-        while start < actual_mm.len() {
-            let same = actual_mm[start..].iter().take_while(|&&reading| reading == actual_mm[start]).count();
-            weights[start..start + same].fill(1.0 / same as f64);
-            start += same;
+impl Model {
+    fn new(lanes: &[Unknowns; LANES], tick_s: f64, substeps: u32) -> Self {
+        let step_s = tick_s / f64::from(substeps);
+        let of = |value: &dyn Fn(&Unknowns) -> f64| core::array::from_fn(|lane| value(&lanes[lane]));
+        let get = |unknown: Unknown| of(&|lane| lane.get(unknown));
+        let dead_steps: Lane = of(&|lane| lane.dead_time_s() / step_s);
+        // The casts cut off.
+        let whole: [u32; LANES] = dead_steps.map(|steps| steps as u32);
+        let omega = |lane: &Unknowns| core::f64::consts::TAU * lane.get(Unknown::BedFrequency);
+        Self {
+            step_s,
+            gain: get(Unknown::Gain),
+            offset: get(Unknown::Offset),
+            whole_ticks: whole.map(|steps| (steps / substeps) as usize),
+            whole_steps: whole.map(|steps| steps % substeps),
+            fraction: core::array::from_fn(|lane| dead_steps[lane] - f64::from(whole[lane])),
+            filter_share: of(&|lane| lag_share(step_s, lane.filter_delay_s())),
+            velocity_gain: get(Unknown::VelocityGain),
+            integral_gain: of(&|lane| {
+                step_s * lane.get(Unknown::VelocityGain) / lane.get(Unknown::IntegralTime)
+            }),
+            limit: get(Unknown::AccelLimit),
+            // A sub-step passes between velocity and torque. A longer one leaves less for the lag.
+            current_share: of(&|lane| {
+                lag_share(step_s, lane.get(Unknown::CurrentLag) + lane.step_s() - step_s)
+            }),
+            viscous_factor: of(&|lane| 1.0 / (1.0 + step_s * lane.get(Unknown::Viscous))),
+            coulomb_step: of(&|lane| step_s * lane.get(Unknown::Coulomb)),
+            stiffness: of(&|lane| omega(lane).powi(2)),
+            damping: of(&|lane| 2.0 * lane.get(Unknown::BedDamping) * omega(lane)),
+            mass_ratio: get(Unknown::BedMassRatio),
+            has_bed: lanes.iter().any(|lane| lane.get(Unknown::BedMassRatio) > 0.0),
         }
-        let weight_sum = weights.iter().sum();
-        Self { command_mm_s: recording.command_mm_s.clone(), actual_mm, weights, weight_sum }
     }
 
-    fn residuals(&self, model: &DriveModel, unknowns: &Unknowns) -> Option<Vec<f64>> {
-        let mut state = DriveState::<LINE>::at_rest(model, 0.0).ok()?;
-        let (gain, offset) = (unknowns.get(Unknown::Gain), unknowns.get(Unknown::Offset));
-        let mut residuals = Vec::with_capacity(self.actual_mm.len());
-        for (command, actual) in self.command_mm_s.iter().zip(&self.actual_mm) {
-            residuals.push(actual - state.position_mm());
-            model.tick(&mut state, gain * command + offset);
+    /// One sub-step with the `delayed` commands; whether the first lane's integrator stopped or went on.
+    fn step(&self, state: &mut State, delayed: &Lane) -> bool {
+        let mut error = [0.0; LANES];
+        let mut demand = [0.0; LANES];
+        let mut is_near = false;
+        for lane in 0..LANES {
+            state.command[lane] += self.filter_share[lane] * (delayed[lane] - state.command[lane]);
+            error[lane] = state.command[lane] - state.velocity[lane];
+            demand[lane] = self.velocity_gain[lane] * error[lane] + state.integral[lane];
+            is_near |= demand[lane].abs() > (1.0 - CROSSING) * self.limit[lane];
         }
-        // Where the encoder's zero lies is unknown: the mean is taken off.
-        let sum: f64 = residuals.iter().zip(&self.weights).map(|(residual, weight)| residual * weight).sum();
-        let mean = sum / self.weight_sum;
-        for (residual, weight) in residuals.iter_mut().zip(&self.weights) {
-            *residual = (*residual - mean) * weight.sqrt();
-        }
-        Some(residuals)
-    }
-}
-
-impl Runs {
-    pub(super) fn new(recordings: &[AxisRecording]) -> Self {
-        let tick_s = recordings.first().map_or(1.0, |recording| recording.tick_s);
-        Self { tick_s, runs: recordings.iter().map(Run::new).collect() }
-    }
-
-    /// The longest τ + Tc that is looked for \[s\].
-    pub(super) fn lag_limit_s(&self) -> f64 {
-        LAG_TICKS_MAX * self.tick_s
-    }
-
-    /// Effective readings of each run.
-    pub(super) fn readings(&self) -> Vec<f64> {
-        self.runs.iter().map(|run| run.weight_sum).collect()
-    }
-
-    /// The residuals of each run; `None` if it can't be simulated.
-    pub(super) fn residuals(&self, unknowns: &Unknowns, substeps: u32) -> Option<Residuals> {
-        let model = DriveModel::new(unknowns.drive(), self.tick_s, substeps).ok()?;
-        let residuals: Residuals =
-            self.runs.iter().map(|run| run.residuals(&model, unknowns)).collect::<Option<_>>()?;
-        residuals.iter().flatten().all(|residual| residual.is_finite()).then_some(residuals)
-    }
-
-    /// Change of the residuals per unit of one unknown's coordinate.
-    pub(super) fn sensitivity(
-        &self,
-        unknowns: &Unknowns,
-        residuals: &Residuals,
-        unknown: Unknown,
-        substeps: u32,
-    ) -> Option<Residuals> {
-        // Towards the inside, where the other side is out of range.
-        let step = unknown.difference();
-        let step = if unknowns.is_held(unknown, step, self.lag_limit_s()) { -step } else { step };
-        let moved = self.residuals(&unknowns.moved(&[unknown], &[step], self.lag_limit_s()), substeps)?;
-        let quotients = moved.into_iter().zip(residuals).map(|(mut moved, still)| {
-            moved.iter_mut().zip(still).for_each(|(moved, still)| *moved = (*moved - still) / step);
-            moved
-        });
-        Some(quotients.collect())
-    }
-
-    /// Linearises about `unknowns`.
-    pub(super) fn linearised(
-        &self,
-        unknowns: &Unknowns,
-        free: &[Unknown],
-        substeps: u32,
-    ) -> Option<Linearised> {
-        let residuals = self.residuals(unknowns, substeps)?;
-        let mut columns = vec![Vec::with_capacity(free.len()); self.runs.len()];
-        for &unknown in free {
-            let sensitivity = self.sensitivity(unknowns, &residuals, unknown, substeps)?;
-            columns.iter_mut().zip(sensitivity).for_each(|(columns, column)| columns.push(column));
-        }
-        let normals = columns.iter().map(|columns| normal(columns)).collect();
-        Some(Linearised { free: free.to_vec(), columns, normals })
-    }
-}
-
-impl Linearised {
-    /// Σ weight·JᵀJ over the runs.
-    pub(super) fn normal(&self, weights: &[f64]) -> Symmetric {
-        let mut sum = Symmetric::zero(self.free.len());
-        self.normals.iter().zip(weights).for_each(|(normal, weight)| sum.add(*weight, normal));
-        sum
-    }
-
-    /// Σ weight·Jᵀr over the runs.
-    pub(super) fn gradient(&self, residuals: &Residuals, weights: &[f64]) -> Vec<f64> {
-        let mut gradient = vec![0.0; self.free.len()];
-        for ((columns, residuals), weight) in self.columns.iter().zip(residuals).zip(weights) {
-            for (sum, column) in gradient.iter_mut().zip(columns) {
-                *sum += weight * dot(column, residuals);
+        let mut runs = [1.0; LANES];
+        if is_near {
+            for lane in 0..LANES {
+                let limit = self.limit[lane];
+                let rise = (demand[lane] - state.demand[lane]).abs().clamp(1e-9 * limit, CROSSING * limit);
+                if demand[lane] * error[lane] > 0.0 {
+                    runs[lane] = (0.5 - (demand[lane].abs() - limit) / rise).clamp(0.0, 1.0);
+                }
             }
         }
-        gradient
+        let is_frozen = runs[0] < 0.5;
+        let is_moment = is_frozen != state.is_frozen;
+        state.is_frozen = is_frozen;
+        for lane in 0..LANES {
+            state.demand[lane] = demand[lane];
+            state.integral[lane] += self.integral_gain[lane] * error[lane] * runs[lane];
+            let limited = demand[lane].min(self.limit[lane]).max(-self.limit[lane]);
+            state.torque[lane] += self.current_share[lane] * (limited - state.torque[lane]);
+            let velocity = state.velocity[lane];
+            let pushed = (velocity + self.step_s * (state.torque[lane] - state.bed_accel[lane]))
+                * self.viscous_factor[lane];
+            let held = pushed.min(self.coulomb_step[lane]).max(-self.coulomb_step[lane]);
+            let next = pushed - held;
+            state.position[lane] += 0.5 * self.step_s * (velocity + next);
+            state.velocity[lane] = next;
+            demand[lane] = (next - velocity) / self.step_s;
+        }
+        if self.has_bed {
+            for (lane, pushed) in demand.iter().enumerate() {
+                let accel = -self.stiffness[lane] * state.bed[lane]
+                    - self.damping[lane] * state.bed_velocity[lane]
+                    - self.mass_ratio[lane] * (pushed + state.bed_accel[lane]);
+                state.bed_accel[lane] = accel;
+                state.bed_velocity[lane] += self.step_s * accel;
+                state.bed[lane] += self.step_s * state.bed_velocity[lane];
+            }
+        }
+        is_moment
     }
 }
 
-fn normal(columns: &[Vec<f64>]) -> Symmetric {
-    let mut normal = Symmetric::zero(columns.len());
-    for (row, left) in columns.iter().enumerate() {
-        for (column, right) in columns.iter().enumerate().take(row + 1) {
-            let value = dot(left, right);
-            *normal.at_mut(row, column) = value;
-            *normal.at_mut(column, row) = value;
+/// The positions of an axis that starts at rest at 0, at the start of every tick \[mm\], by set of unknowns; and
+/// the ticks in which the first set's current limit stops or frees the integrator.
+pub(super) fn simulate(
+    command_mm_s: &[f64],
+    tick_s: f64,
+    substeps: u32,
+    lanes: &[Unknowns; LANES],
+    each: &mut dyn FnMut(usize, &[f64; LANES]),
+) -> Vec<usize> {
+    let model = Model::new(lanes, tick_s, substeps);
+    let mut state = State::default();
+    let mut moments = Vec::new();
+    for tick in 0..command_mm_s.len() {
+        each(tick, &state.position);
+        let (mut late, mut earlier, mut between) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            let at = |ticks: usize| match tick.checked_sub(ticks) {
+                Some(tick) => model.gain[lane] * command_mm_s[tick] + model.offset[lane],
+                None => 0.0,
+            };
+            late[lane] = at(model.whole_ticks[lane]);
+            earlier[lane] = at(model.whole_ticks[lane] + 1);
+            between[lane] = late[lane] + model.fraction[lane] * (earlier[lane] - late[lane]);
+        }
+        for step in 0..substeps {
+            let mut delayed = late;
+            for lane in 0..LANES {
+                if step < model.whole_steps[lane] {
+                    delayed[lane] = earlier[lane];
+                } else if step == model.whole_steps[lane] {
+                    delayed[lane] = between[lane];
+                }
+            }
+            if model.step(&mut state, &delayed) && moments.last() != Some(&tick) {
+                moments.push(tick);
+            }
         }
     }
-    normal
+    moments
 }
 
-/// Σ a·b.
-pub(super) fn dot(left: &[f64], right: &[f64]) -> f64 {
-    left.iter().zip(right).map(|(left, right)| left * right).sum()
-}
+#[cfg(test)]
+mod tests {
+    use hal_sim::{DriveModel, DriveState, REFERENCE_Y};
 
-/// Σ r² of each run.
-pub(super) fn squares(residuals: &Residuals) -> Vec<f64> {
-    residuals.iter().map(|run| dot(run, run)).collect()
+    use super::*;
+
+    /// Without the current limit bit for bit but for the order of operations, with it to half a sub-step.
+    #[test]
+    fn it_is_the_drive_of_hal_sim() {
+        let mut unknowns = Unknowns::zero(2.5e-5);
+        let bed = REFERENCE_Y.bed.expect("Y has a bed");
+        for (unknown, value) in [
+            (Unknown::Gain, 1.0),
+            (Unknown::VelocityGain, 440.0),
+            (Unknown::IntegralTime, 0.0275),
+            (Unknown::AccelLimit, 12_300.0),
+            (Unknown::Coulomb, 260.0),
+            (Unknown::Viscous, 0.08),
+            (Unknown::BedFrequency, bed.frequency_hz),
+            (Unknown::BedDamping, bed.damping_ratio),
+            (Unknown::BedMassRatio, bed.mass_ratio),
+        ] {
+            unknowns.set(unknown, value);
+        }
+        unknowns.set_lags(0.001_43, 0.0007, 0.000_37);
+        let drive = unknowns.drive();
+        assert!(
+            (drive.current_lag_s - 0.00037).abs() < 1e-12 && (drive.command_filter_s - 0.0007).abs() < 1e-12
+        );
+        let model = DriveModel::new(drive, 5e-4, SUBSTEPS).expect("a drive");
+        for (feed_mm_s, tolerance_mm, limited) in [(12.0, 1e-9, false), (150.0, 1.5e-3, true)] {
+            let command: Vec<f64> =
+                (0..1200).map(|tick| if (100..600).contains(&tick) { feed_mm_s } else { 0.0 }).collect();
+            let mut state = DriveState::<256>::at_rest(&model, 0.0).expect("at rest");
+            let mut expected = Vec::new();
+            for command_mm_s in &command {
+                expected.push(state.position_mm());
+                model.tick(&mut state, *command_mm_s);
+            }
+            let mut other = unknowns;
+            other.set(Unknown::VelocityGain, 100.0);
+            let mut worst_mm = 0.0_f64;
+            let moments =
+                simulate(&command, 5e-4, SUBSTEPS, &[unknowns, other, other, unknowns], &mut |tick, at| {
+                    worst_mm = worst_mm.max((at[0] - expected[tick]).abs());
+                    assert_eq!(at[0].to_bits(), at[3].to_bits());
+                });
+            assert!(worst_mm < tolerance_mm, "{feed_mm_s} mm/s: {worst_mm} mm");
+            assert_eq!(!moments.is_empty(), limited, "{moments:?}");
+        }
+    }
 }

@@ -34,13 +34,13 @@ const CRUISE_S: f64 = 0.1;
 
 /// All steps from rest of a run.
 pub(super) fn step_reading(run: &AxisRecording, resolution_mm: f64) -> Vec<StepReading> {
-    let command = &run.command_mm_s;
+    let (command, rest_mm_s) = (&run.command_mm_s, run.rest_mm_s());
     let (rest, cruise) = (ticks(REST_S, run.tick_s), ticks(CRUISE_S, run.tick_s));
     let mut figures = Vec::new();
     let mut at = rest;
     while at + cruise <= command.len() {
         let feed = command[at];
-        let is_step = feed != 0.0 && command[at - rest..at].iter().all(|&before| before == 0.0);
+        let is_step = feed != rest_mm_s && command[at - rest..at].iter().all(|&before| before == rest_mm_s);
         let stands = command[at..].iter().take_while(|&&after| after == feed).count();
         if is_step && stands >= cruise {
             figures.extend(step(run, resolution_mm, at, stands));
@@ -56,7 +56,7 @@ fn ticks(time_s: f64, tick_s: f64) -> usize {
 
 fn step(run: &AxisRecording, resolution_mm: f64, at: usize, stands: usize) -> Option<StepReading> {
     let tick_s = run.tick_s;
-    let feed = run.command_mm_s[at];
+    let feed = run.command_mm_s[at] - run.rest_mm_s();
     let start = at - ticks(REST_S, tick_s) / 2;
     let readings: Vec<f64> =
         run.actual_mm[start..at + stands].iter().map(|reading| reading * feed.signum()).collect();

@@ -12,7 +12,8 @@ use crate::drive::harmonic::{self, Response};
 use crate::drive::identification::identify_axes;
 use crate::drive::reference::{BANDWIDTH_FEED_MM_S, CIRCLE_FEED_MM_S};
 use crate::drive::step::Step;
-use crate::drive::{AXES, DriveError, Terms, experiment, inertia, verification};
+use crate::drive::verification::{self, Verdict};
+use crate::drive::{AXES, DriveError, Terms, experiment, inertia};
 use crate::gcode::{Axis, Plane};
 use crate::identify::Identification;
 use crate::machine::{AxisEdit, Machine, NumberEdit, edited, with_numbers};
@@ -102,9 +103,12 @@ struct Bench {
     found: Vec<Identification>,
     /// Text and machine after tuning.
     tuned: Option<(String, Machine)>,
-    /// Circles before tuning.
-    before: Vec<CircleFigures>,
+    /// The acceleration that each axis bears \[mm/s²\].
+    bears_mm_s2: [f64; AXES],
+    /// Circles before tuning, or why they can't be driven.
+    before: Vec<Result<CircleFigures, String>>,
     worse: usize,
+    compared: usize,
 }
 
 /// A run, or what is concluded from runs.
@@ -147,8 +151,10 @@ pub(super) fn begin(request: DriveRequest) -> Result<Box<dyn Work>, String> {
         tables: Vec::new(),
         found: Vec::new(),
         tuned: None,
+        bears_mm_s2: [f64::INFINITY; AXES],
         before: Vec::new(),
         worse: 0,
+        compared: 0,
     };
     Ok(Box::new(Experimenting { experiment, bench, all: pieces.len(), pieces }))
 }
@@ -161,10 +167,14 @@ impl Work for Experimenting {
         if !self.pieces.is_empty() {
             return Ok(None);
         }
-        let Bench { text, machine, tables, tuned, worse, .. } = &mut self.bench;
-        let is_good = *worse == 0;
+        let Bench { text, machine, tables, tuned, worse, compared, .. } = &mut self.bench;
+        let is_verified = self.experiment != Experiment::Tune || *compared > 0;
+        let is_good = *worse == 0 && is_verified;
         let outcome = match (self.experiment, is_good) {
             (Experiment::Tune, true) => "Tuned: no circle is worse than before.".to_owned(),
+            (Experiment::Tune, false) if !is_verified => {
+                "Not verified: no circle could be driven.".to_owned()
+            }
             (Experiment::Tune, false) => format!("Not better: {worse} circles are worse than before."),
             _ => "Done without a fault.".to_owned(),
         };
@@ -334,7 +344,7 @@ fn tune() -> VecDeque<Piece> {
     };
     let before = |(plane, hz): (Plane, f64)| -> Piece {
         Box::new(move |bench| {
-            let found = driven(&bench.machine, plane, hz)?;
+            let found = driven(bench, &bench.machine, plane, hz);
             bench.before.push(found);
             Ok(())
         })
@@ -353,8 +363,16 @@ fn tune() -> VecDeque<Piece> {
         .collect()
 }
 
-fn driven(machine: &Machine, plane: Plane, frequency_hz: f64) -> Result<CircleFigures, String> {
-    let circle = verification::circle(plane, frequency_hz);
+/// A circle of the machine before or after tuning, within what its axes bear.
+fn driven(
+    bench: &Bench,
+    machine: &Machine,
+    plane: Plane,
+    frequency_hz: f64,
+) -> Result<CircleFigures, String> {
+    let [first, second, _] = plane.axes();
+    let bears_mm_s2 = bench.bears_mm_s2[first].min(bench.bears_mm_s2[second]);
+    let (circle, _) = verification::circle(plane, frequency_hz, &bench.machine, bears_mm_s2);
     let recording = circle.record(machine).map_err(told)?;
     circle::figures(&recording, &circle).map_err(told)
 }
@@ -363,6 +381,7 @@ fn driven(machine: &Machine, plane: Plane, frequency_hz: f64) -> Result<CircleFi
 fn proposed(bench: &mut Bench) -> Result<(), String> {
     let mut edits = Vec::with_capacity(AXES);
     for (axis, found) in std::mem::take(&mut bench.found).into_iter().enumerate() {
+        bench.bears_mm_s2[axis] = verification::bears_mm_s2(&found).unwrap_or(f64::INFINITY);
         let settings = &bench.machine.axes[axis];
         let proposal = propose(settings, &found, tuning::Method::Inverse, bench.machine.tick_s);
         let proposal = proposal.map_err(|error| error.to_string())?;
@@ -395,15 +414,33 @@ fn proposed(bench: &mut Bench) -> Result<(), String> {
 /// A circle after tuning, beside the one before.
 fn compare(bench: &mut Bench, index: usize, plane: Plane, frequency_hz: f64) -> Result<(), String> {
     let Some((_, tuned)) = &bench.tuned else { return Ok(()) };
-    let after = driven(tuned, plane, frequency_hz)?;
-    let before = bench.before[index];
-    let is_no_worse = verification::is_no_worse(tuned, [true; 2], &before, &after);
-    bench.worse += usize::from(!is_no_worse);
-    let [first, second] = before.axes.map(|axis| bench.axis_name(axis));
+    let after = driven(bench, tuned, plane, frequency_hz);
+    let axes = [plane.axes()[0], plane.axes()[1]];
+    let [first, second] = axes.map(|axis| bench.axis_name(axis));
     let title = format!("Circles of {first} and {second}, before and after");
+    let verdict = Verdict { machine: tuned, is_tuned: [true; 2] };
+    let (row, is_worse) = match (&bench.before[index], after) {
+        (Ok(before), Ok(after)) => {
+            bench.compared += 1;
+            let is_worse = !verdict.is_no_worse(before, &after);
+            let of = |circle: &CircleFigures| (circle.contour_um(), circle.form_um());
+            let ((contour, form), (contour_after, form_after)) = (of(before), of(&after));
+            let figures = [before.feed_mm_s * 60.0, contour, contour_after, form, form_after].map(Cell::Number);
+            let verdict = words(if is_worse { "worse" } else { "no worse" });
+            (figures.into_iter().chain([verdict]).collect::<Vec<_>>(), is_worse)
+        }
+        // What the machine could drive before, it is to drive now.
+        (before, after) => {
+            let told = before.as_ref().err().cloned().or(after.err()).unwrap_or_default();
+            let nothing = (0..5).map(|_| number(None));
+            (nothing.chain([words(told)]).collect(), before.is_ok())
+        }
+    };
+    bench.worse += usize::from(is_worse);
     if bench.tables.last().is_none_or(|table| table.title != title) {
         let head = [
             "Frequency [Hz]",
+            "Feed [mm/min]",
             "Contour error before [µm]",
             "after [µm]",
             "Form deviation before [µm]",
@@ -412,8 +449,6 @@ fn compare(bench: &mut Bench, index: usize, plane: Plane, frequency_hz: f64) -> 
         ];
         bench.begin_table(title, &head);
     }
-    let figures = [frequency_hz, before.contour_um(), after.contour_um(), before.form_um(), after.form_um()];
-    let verdict = words(if is_no_worse { "no worse" } else { "worse" });
-    bench.row(figures.map(Cell::Number).into_iter().chain([verdict]).collect());
+    bench.row([Cell::Number(frequency_hz)].into_iter().chain(row).collect());
     Ok(())
 }

@@ -58,13 +58,15 @@ impl Known {
             of(found.viscous_friction_per_s, |drive| drive.viscous_friction_per_s);
         let (coulomb_friction_mm_s2, coulomb_friction) =
             of(found.coulomb_friction_mm_s2, |drive| drive.coulomb_friction_mm_s2);
-        // However the delay is split, as a whole it is what was found.
+        // However the delay is split, as a whole it is what was found. The inverse leads by dead time and filter alike.
         let both_s = (found.total_delay_s.value - 0.5 * tick_s).max(0.0);
         let current_lag_s = lag_s.min(both_s);
+        let command_filter_s = found.command_filter_s.value.min(both_s - current_lag_s);
         let (bed, bed_origin) = bed_of(found.bed.as_ref(), file.and_then(|drive| drive.bed));
         let drive = DriveParameters {
             current_lag_s,
-            dead_time_s: both_s - current_lag_s,
+            dead_time_s: both_s - current_lag_s - command_filter_s,
+            command_filter_s,
             viscous_friction_per_s,
             coulomb_friction_mm_s2,
             bed,

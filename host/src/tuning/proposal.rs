@@ -150,6 +150,13 @@ fn offset_v(axis: &AxisSettings, parameters: &AxisParametersFound) -> f64 {
 fn remarks(axis: &AxisSettings, found: &Identification) -> Vec<String> {
     let parameters = &found.parameters;
     let mut remarks = Vec::new();
+    if !found.is_met() {
+        remarks.push(format!(
+            "The model does not follow the recordings: what is left has {:.1} times the square of the readings' errors. \
+             The axis has something that the model lacks, and intervals are as wide as that allows.",
+            found.misfit_per_reading,
+        ));
+    }
     let limit = parameters.accel_limit_mm_s2;
     if limit.is_determined() {
         let share = axis.accel_mm_s2 / limit.value;
@@ -373,7 +380,7 @@ mod tests {
     use hal_sim::{DriveModel, DriveState};
 
     use super::*;
-    use crate::identify::{AxisRecording, identification_plan, identify};
+    use crate::identify::{AxisRecording, explore, identify};
     use crate::machine::Machine;
 
     const TICK_S: f64 = 5e-4;
@@ -394,10 +401,15 @@ mod tests {
             };
             let actual_mm = command_mm_s.iter().map(&mut latch).collect();
             let harmonic_hz = excitation.harmonic_hz();
-            AxisRecording { tick_s: TICK_S, command_mm_s, actual_mm, lead_in_ticks: 0, harmonic_hz }
+            Ok::<_, ()>(AxisRecording {
+                tick_s: TICK_S,
+                command_mm_s,
+                actual_mm,
+                lead_in_ticks: 0,
+                harmonic_hz,
+            })
         };
-        identify(&identification_plan(f64::INFINITY).iter().map(run).collect::<Vec<_>>())
-            .expect("an identification")
+        identify(&explore(TICK_S, 333.0, run).expect("runs")).expect("an identification")
     }
 
     /// What everything depends on has to be known; what the rest is not known to be stays, as far as the

@@ -129,8 +129,9 @@ fn drive_refuses_what_cannot_be_done() {
 fn drive_tune_writes_what_it_has_verified() {
     let workspace = Workspace::new("tune");
     let json = workspace.json(&["drive", "tune", "--axis", "x,Y", "--output", "tuned.toml", "--json"]);
-    assert_has(&json, &["axes", "learning", "output", "verification"]);
-    assert!(json["learning"].is_null());
+    assert_has(&json, &["axes", "learning", "output", "reason", "verification"]);
+    assert!(json["learning"].is_null() && json["reason"].is_null());
+    assert!(json["verification"]["not_driven"].as_array().expect("a list").is_empty(), "{json}");
     assert_eq!(json["output"], "tuned.toml");
     let axes = json["axes"].as_array().expect("a list");
     assert_eq!(axes.len(), 2);
@@ -197,9 +198,12 @@ fn drive_tune_writes_what_it_has_verified() {
     let output = workspace.motion(&worse);
     assert_eq!(output.status.code(), Some(1));
     let said = String::from_utf8_lossy(&output.stdout);
-    assert!(said.contains("a circle got worse: no machine file is written"), "{said}");
+    assert!(said.contains("no machine file is written: the circle at "), "{said}");
     // All axes were tuned, and all of them moved.
-    assert!(said.contains("Circles of X and Y at") && said.contains("Circles of Z and X at"), "{said}");
+    assert!(
+        said.contains("Circles of X and Y, before") && said.contains("Circles of Z and X, before"),
+        "{said}"
+    );
     assert!(!workspace.0.join("worse.toml").exists());
 
     // Before the work, and so before a file is made.
@@ -257,4 +261,100 @@ fn drive_tune_judges_one_axis_by_itself() {
         };
         assert!(circles.iter().any(is_worse), "matched axes");
     }
+}
+
+/// The reference machine with the drives of all axes made `by` times as strong: what they reach and how hard they push.
+/// Nobody plans faster than the drives are.
+fn as_strong(by: f64) -> String {
+    let mut text = String::new();
+    for line in motion_host::machine::REFERENCE_TOML.lines() {
+        let value = line.split_once(" = ").and_then(|(key, value)| Some((key, value.parse::<f64>().ok()?)));
+        let stronger = match value {
+            Some((key @ ("mm_min_at_10_v" | "accel_limit_mm_s2"), value)) => Some((key, value * by)),
+            Some((key @ ("feed_mm_s" | "accel_mm_s2"), value)) => Some((key, value * by.min(1.0))),
+            _ => None,
+        };
+        match stronger {
+            Some((key, value)) => text.push_str(&format!("{key} = {value:.1}\n")),
+            None => text.push_str(&format!("{line}\n")),
+        }
+    }
+    text
+}
+
+/// Every experiment runs with its defaults on machines five times weaker and five times stronger than the reference;
+/// what they can't do is named.
+#[test]
+fn drive_runs_on_weak_and_on_strong_machines() {
+    for (name, by) in [("weak", 0.2), ("strong", 5.0)] {
+        let workspace = Workspace::new(&format!("drive-{name}"));
+        workspace.put("m.toml", &as_strong(by));
+        for experiment in [
+            &["step"][..],
+            &["harmonic", "--from", "8", "--to", "16", "--by", "8"],
+            &["inertia", "--loads", "0,1"],
+            &["circle", "--from", "4", "--to", "8", "--by", "4"],
+            &["compare", "--from", "4", "--to", "4"],
+            &["bode", "--points", "3"],
+            &["identify", "--axis", "Y"],
+        ] {
+            let json = workspace.json(&[&["drive"], experiment, &["--machine", "m.toml", "--json"]].concat());
+            assert!(json.is_object(), "{name} {experiment:?}");
+        }
+        let arguments =
+            ["drive", "tune", "--axis", "X,Y", "--machine", "m.toml", "--output", "t.toml", "--json"];
+        let json = workspace.json(&arguments);
+        assert!(json["reason"].is_null() && json["output"] == "t.toml", "{name}: {}", json["reason"]);
+        let circles = json["verification"]["circles"].as_array().expect("a list");
+        assert_eq!(circles.len(), 6, "{name}: {}", json["verification"]);
+        let slower = json["verification"]["not_driven"].as_array().expect("a list");
+        assert_eq!(slower.is_empty(), by > 1.0, "{name}: {slower:?}");
+        let better = |circle: &Value| {
+            number(&circle["after"]["contour_error_um"]) < number(&circle["before"]["contour_error_um"])
+        };
+        assert!(circles.iter().all(better), "{name}: {circles:?}");
+    }
+}
+
+/// What a command that succeeds prints.
+fn said(workspace: &Workspace, arguments: &[&str]) -> String {
+    let output = workspace.motion(arguments);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// A simulated run of the program that `excitation` writes tells the drive; so does CSV, and what neither shows is said.
+#[test]
+fn drive_identifies_an_axis_from_what_was_recorded() {
+    let workspace = Workspace::new("identify");
+    let words = said(&workspace, &["drive", "excitation", "--axis", "Y", "--output", "y.ngc"]);
+    assert!(words.contains("program written to y.ngc"), "{words}");
+    said(&workspace, &["run", "y.ngc", "--record", "y.mrec"]);
+    let json = workspace.json(&["drive", "identify", "--axis", "Y", "--from", "y.mrec", "--json"]);
+    assert_has(&json, &["axis", "encoder_step_mm", "found", "lacks", "misfit_per_reading"]);
+    let found = &json["found"];
+    let value = |key: &str| number(&found[key]["value"]);
+    assert!((value("velocity_gain_per_s") / 440.0 - 1.0).abs() < 0.02, "{found}");
+    assert!((value("integral_time_s") / 0.0275 - 1.0).abs() < 0.02, "{found}");
+    assert!((value("coulomb_friction_mm_s2") / 260.0 - 1.0).abs() < 0.02, "{found}");
+    assert!((value("total_delay_s") / 0.002_04 - 1.0).abs() < 0.02, "{found}");
+    assert!(found["load_inertia_ratio"]["half_width_95"].is_null(), "{found}");
+    let lacks = json["lacks"].to_string();
+    assert!(lacks.contains("the load inertia"), "{lacks}");
+
+    let tune = ["drive", "tune", "--axis", "Y", "--from", "y.mrec", "--output", "t.toml", "--json"];
+    let json = workspace.json(&tune);
+    assert_eq!(json["output"], "t.toml", "{}", json["reason"]);
+    let refusal = workspace.refusal(&["drive", "tune", "--axis", "X,Y", "--from", "y.mrec"]);
+    assert!(refusal.contains("--axis with the one axis that was recorded"), "{refusal}");
+
+    workspace.put("bad.csv", "time_s,command_v,counts\n0,0,0\n0.0005,0,what\n");
+    let refusal = workspace.refusal(&["drive", "identify", "--from", "bad.csv"]);
+    assert!(refusal.contains("bad.csv:3: found '0.0005,0,what', expected three finite numbers"), "{refusal}");
+    let still: String = (0..100).map(|tick| format!("{},{},7\n", f64::from(tick) * 5e-4, tick % 2)).collect();
+    workspace.put("still.csv", &format!("time_s,command_v,counts\n{still}"));
+    let output = workspace.motion(&["drive", "identify", "--from", "still.csv"]);
+    assert_eq!(output.status.code(), Some(1));
+    let refusal = String::from_utf8_lossy(&output.stderr);
+    assert!(refusal.contains("is the drive enabled, the encoder connected?"), "{refusal}");
 }

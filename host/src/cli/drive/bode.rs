@@ -5,12 +5,13 @@ use std::io::{self, Write};
 use clap::Args;
 use serde::Serialize;
 
-use super::{Common, axis_named, or_dash};
+use super::{Common, axis_named, feed_mm_min, or_dash};
 use crate::cli::error::{CliError, Outcome};
 use crate::cli::progress::Progress;
 use crate::cli::table::{self, Align};
 use crate::cli::write_json;
 use crate::drive::bode::{Bode, Point, measure};
+use crate::drive::circle_motion::plane_of;
 use crate::drive::{HALF_POWER, model};
 use crate::report;
 
@@ -41,9 +42,9 @@ pub struct BodeArguments {
     /// Number of frequencies, in equal ratios.
     #[arg(long, value_name = "NUMBER", default_value_t = 41)]
     points: u32,
-    /// Feed of the step and of the harmonics, mm/min.
-    #[arg(long, value_name = "MM_MIN", default_value_t = 9549.0, allow_negative_numbers = true)]
-    feed_mm_min: f64,
+    /// Feed of the step and of the harmonics, mm/min; without it 9549, or what the machine reaches.
+    #[arg(long, value_name = "MM_MIN", allow_negative_numbers = true)]
+    feed_mm_min: Option<f64>,
     #[command(flatten)]
     common: Common,
 }
@@ -79,7 +80,9 @@ pub fn run(arguments: &BodeArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     let frequencies_hz = in_equal_ratios(arguments)?;
     let report = arguments.common.report()?;
     let mut progress = Progress::new(frequencies_hz.len() as u64);
-    let feed_mm_s = arguments.feed_mm_min / 60.0;
+    let [first, second, _] = plane_of(axis).axes();
+    let feed_mm_min = feed_mm_min(&machine, &[first, second], arguments.feed_mm_min, 9549.0);
+    let feed_mm_s = feed_mm_min / 60.0;
     let bode = measure(&machine, axis, feed_mm_s, &frequencies_hz, &mut || progress.step())?;
     progress.finish();
     let name = &machine.axes[axis].name;
@@ -87,14 +90,14 @@ pub fn run(arguments: &BodeArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     if arguments.common.json {
         let json = BodeJson {
             axis: name,
-            feed_mm_min: arguments.feed_mm_min,
+            feed_mm_min,
             step_bandwidth_hz: bode.step.bandwidth_hz,
             linear_bandwidth_hz: linear_hz,
             points: points(&bode),
         };
         write_json(&json, out)?;
     } else {
-        writeln!(out, "Axis {name} at {} mm/min, open loop\n", arguments.feed_mm_min)
+        writeln!(out, "Axis {name} at {} mm/min, open loop\n", feed_mm_min)
             .and_then(|()| write_points(&bode, out))
             .map_err(CliError::Output)?;
         writeln!(

@@ -7,8 +7,8 @@ use motion_kernel::axis::{Feedforward as KernelFeedforward, Tables};
 use serde::Serialize;
 
 use super::{
-    Common, ComparisonJson, Feedforward, comparisons_json, frequencies, is_feed, or_dash, outcome,
-    write_comparisons,
+    Common, ComparisonJson, Feedforward, comparisons_json, feed_mm_min, frequencies, is_feed, or_dash,
+    outcome, write_comparisons,
 };
 use crate::cli::error::{CliError, Outcome};
 use crate::cli::progress::Progress;
@@ -41,9 +41,9 @@ pub struct CircleArguments {
     /// Step between frequencies, Hz.
     #[arg(long, value_name = "HZ", default_value_t = 1.0, allow_negative_numbers = true)]
     by: f64,
-    /// Feed on the circle, mm/min.
-    #[arg(long, value_name = "MM_MIN", default_value_t = 2150.0, allow_negative_numbers = true)]
-    feed_mm_min: f64,
+    /// Feed on the circle, mm/min; without it 2150, or what the machine reaches.
+    #[arg(long, value_name = "MM_MIN", allow_negative_numbers = true)]
+    feed_mm_min: Option<f64>,
     /// Feedforward terms of the machine that act; circles are driven with each choice.
     #[arg(
         long,
@@ -109,7 +109,8 @@ pub fn run(arguments: &CircleArguments, out: &mut dyn Write) -> Result<Outcome, 
     let machine = arguments.common.machine()?;
     let frequencies_hz = frequencies(arguments.from, arguments.to, arguments.by)?;
     let report = arguments.common.report()?;
-    let feed_mm_s = arguments.feed_mm_min / 60.0;
+    let feed_mm_min = feed_mm_min(&machine, &[0, 1], arguments.feed_mm_min, 2150.0);
+    let feed_mm_s = feed_mm_min / 60.0;
     let limit = (arguments.limit_um, (arguments.from, arguments.to, arguments.by));
     let mut progress = Progress::new((frequencies_hz.len() * arguments.feedforward.len()) as u64);
     let mut sweeps = Vec::with_capacity(arguments.feedforward.len());
@@ -120,7 +121,7 @@ pub fn run(arguments: &CircleArguments, out: &mut dyn Write) -> Result<Outcome, 
         })?);
     }
     progress.finish();
-    let is_published = is_feed(arguments.feed_mm_min, reference::CIRCLE_FEED_MM_S);
+    let is_published = is_feed(feed_mm_min, reference::CIRCLE_FEED_MM_S);
     let comparisons = if is_published && reference::is_reference(&machine) {
         reference::compare_circle(&machine)?
     } else {
@@ -128,14 +129,14 @@ pub fn run(arguments: &CircleArguments, out: &mut dyn Write) -> Result<Outcome, 
     };
     if arguments.common.json {
         let json = CircleJson {
-            feed_mm_min: arguments.feed_mm_min,
+            feed_mm_min,
             limit_um: arguments.limit_um,
             feedforward: sweeps.iter().map(sweep_json).collect(),
             reference: comparisons_json(&comparisons),
         };
         write_json(&json, out)?;
     } else {
-        writeln!(out, "Circles at {} mm/min, closed loop", arguments.feed_mm_min)
+        writeln!(out, "Circles at {} mm/min, closed loop", feed_mm_min)
             .and_then(|()| write_sweeps(&sweeps, arguments.limit_um, out))
             .and_then(|()| write_comparisons(&comparisons, out))
             .map_err(CliError::Output)?;

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use clap::Args;
 use serde::Serialize;
 
-use super::{Common, frequencies};
+use super::{Common, feed_mm_min, frequencies};
 use crate::cli::demo::STRINGER;
 use crate::cli::error::{CliError, Outcome};
 use crate::cli::progress::Progress;
@@ -49,9 +49,9 @@ pub struct CompareArguments {
     /// Step between frequencies, Hz.
     #[arg(long, value_name = "HZ", default_value_t = 1.0, allow_negative_numbers = true)]
     by: f64,
-    /// Feed on the circles, mm/min.
-    #[arg(long, value_name = "MM_MIN", default_value_t = 2150.0, allow_negative_numbers = true)]
-    feed_mm_min: f64,
+    /// Feed on the circles, mm/min; without it 2150, or what the machine reaches.
+    #[arg(long, value_name = "MM_MIN", allow_negative_numbers = true)]
+    feed_mm_min: Option<f64>,
     /// Resolutions of set positions, µm; the sweep uses the first, the picture of outputs the last.
     #[arg(long, value_name = "UM,…", value_delimiter = ',', default_values_t = [0.1, 1.0], num_args = 1..)]
     resolutions_um: Vec<f64>,
@@ -125,7 +125,8 @@ pub fn run(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outcome,
     let frequencies_hz = frequencies(arguments.from, arguments.to, arguments.by)?;
     let (first_um, last_um) = resolutions(&arguments.resolutions_um)?;
     let report = arguments.common.report()?;
-    let feed_mm_s = arguments.feed_mm_min / 60.0;
+    let feed_mm_min = feed_mm_min(&machine, &[0, 1], arguments.feed_mm_min, 2150.0);
+    let feed_mm_s = feed_mm_min / 60.0;
     let mut motions: Vec<Motion> =
         SHOWN_HZ.iter().map(|&hz| Motion::Circle(Circle::new(hz, feed_mm_s))).collect();
     motions.push(Motion::Program("stringer.ngc", STRINGER));
@@ -137,7 +138,7 @@ pub fn run(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outcome,
     progress.finish();
     if arguments.common.json {
         let json = CompareJson {
-            feed_mm_min: arguments.feed_mm_min,
+            feed_mm_min,
             motions: motions.iter().map(Motion::name).collect(),
             fitted: fitted(&machine, &regulators),
             regulators: rows.iter().map(row_json).collect(),

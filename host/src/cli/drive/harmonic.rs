@@ -6,8 +6,8 @@ use clap::Args;
 use serde::Serialize;
 
 use super::{
-    Common, ComparisonJson, Feedforward, comparisons_json, frequencies, is_feed, or_dash, outcome,
-    write_comparisons,
+    Common, ComparisonJson, Feedforward, comparisons_json, feed_mm_min, frequencies, is_feed, or_dash,
+    outcome, write_comparisons,
 };
 use crate::cli::error::{CliError, Outcome};
 use crate::cli::progress::Progress;
@@ -44,9 +44,9 @@ pub struct HarmonicArguments {
     /// Step between frequencies, Hz.
     #[arg(long, value_name = "HZ", default_value_t = 4.0, allow_negative_numbers = true)]
     by: f64,
-    /// Feed on the circle, mm/min: the amplitude of the velocities.
-    #[arg(long, value_name = "MM_MIN", default_value_t = 9549.0, allow_negative_numbers = true)]
-    feed_mm_min: f64,
+    /// Feed on the circle, mm/min: the amplitude of the velocities; without it 9549, or what the machine reaches.
+    #[arg(long, value_name = "MM_MIN", allow_negative_numbers = true)]
+    feed_mm_min: Option<f64>,
     /// Keep the machine's regulator; without it, the loop is open.
     #[arg(long)]
     closed_loop: bool,
@@ -102,7 +102,8 @@ pub fn run(arguments: &HarmonicArguments, out: &mut dyn Write) -> Result<Outcome
     let machine = arguments.common.machine()?;
     let frequencies_hz = frequencies(arguments.from, arguments.to, arguments.by)?;
     let report = arguments.common.report()?;
-    let feed_mm_s = arguments.feed_mm_min / 60.0;
+    let feed_mm_min = feed_mm_min(&machine, &[0, 1], arguments.feed_mm_min, 9549.0);
+    let feed_mm_s = feed_mm_min / 60.0;
     let ran = if arguments.closed_loop {
         arguments.feedforward.terms().of(&machine)
     } else {
@@ -129,17 +130,16 @@ pub fn run(arguments: &HarmonicArguments, out: &mut dyn Write) -> Result<Outcome
         })
     };
     let bandwidths = [of_axis(0)?, of_axis(1)?];
-    let is_published =
-        is_feed(arguments.feed_mm_min, reference::BANDWIDTH_FEED_MM_S) && !arguments.closed_loop;
+    let is_published = is_feed(feed_mm_min, reference::BANDWIDTH_FEED_MM_S) && !arguments.closed_loop;
     let comparisons = if is_published && reference::is_reference(&machine) {
         reference::compare_harmonic(&machine)?
     } else {
         Vec::new()
     };
-    let explanation = explanation(&bandwidths[0], arguments.feed_mm_min, &machine.axes[0].name);
+    let explanation = explanation(&bandwidths[0], feed_mm_min, &machine.axes[0].name);
     if arguments.common.json {
         let json = HarmonicJson {
-            feed_mm_min: arguments.feed_mm_min,
+            feed_mm_min,
             open_loop: !arguments.closed_loop,
             axes: (0..2).map(|axis| axis_json(&machine, axis, &bandwidths[axis], &found)).collect(),
             reference: comparisons_json(&comparisons),
@@ -147,7 +147,7 @@ pub fn run(arguments: &HarmonicArguments, out: &mut dyn Write) -> Result<Outcome
         write_json(&json, out)?;
     } else {
         let how = if arguments.closed_loop { "closed loop" } else { "open loop" };
-        writeln!(out, "Harmonic motion at {} mm/min, {how}", arguments.feed_mm_min)
+        writeln!(out, "Harmonic motion at {} mm/min, {how}", feed_mm_min)
             .and_then(|()| write_axes(&machine, &found, &bandwidths, out))
             .and_then(|()| if arguments.closed_loop { Ok(()) } else { writeln!(out, "\n{explanation}") })
             .and_then(|()| write_comparisons(&comparisons, out))

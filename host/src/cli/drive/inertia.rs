@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use clap::Args;
 use serde::Serialize;
 
-use super::{Common, axis_named};
+use super::{Common, axis_named, feed_mm_min};
 use crate::cli::error::{CliError, Outcome};
 use crate::cli::progress::Progress;
 use crate::cli::table::{self, Align};
@@ -31,9 +31,9 @@ pub struct InertiaArguments {
     /// Frequency, Hz.
     #[arg(long, value_name = "HZ", default_value_t = 8.0, allow_negative_numbers = true)]
     frequency: f64,
-    /// Feed on the circle, mm/min.
-    #[arg(long, value_name = "MM_MIN", default_value_t = 9549.0, allow_negative_numbers = true)]
-    feed_mm_min: f64,
+    /// Feed on the circle, mm/min; without it 9549, or what the machine reaches.
+    #[arg(long, value_name = "MM_MIN", allow_negative_numbers = true)]
+    feed_mm_min: Option<f64>,
     /// Added inertia over the unloaded axis's; the motion is run with each.
     #[arg(long, value_name = "RATIO,…", value_delimiter = ',', default_values_t = [0.0, 0.5, 1.0, 2.0])]
     loads: Vec<f64>,
@@ -68,7 +68,9 @@ pub fn run(arguments: &InertiaArguments, out: &mut dyn Write) -> Result<Outcome,
     let machine = arguments.common.machine()?;
     let axis = axis_named(&machine, &arguments.axis)?;
     let report = arguments.common.report()?;
-    let feed_mm_s = arguments.feed_mm_min / 60.0;
+    let [first, second, _] = plane_of(axis).axes();
+    let feed_mm_min = feed_mm_min(&machine, &[first, second], arguments.feed_mm_min, 9549.0);
+    let feed_mm_s = feed_mm_min / 60.0;
     let circle = Circle { plane: plane_of(axis), ..Circle::new(arguments.frequency, feed_mm_s) };
     let mut progress = Progress::new(arguments.loads.len() as u64);
     let mut found = Vec::with_capacity(arguments.loads.len());
@@ -91,12 +93,12 @@ pub fn run(arguments: &InertiaArguments, out: &mut dyn Write) -> Result<Outcome,
         let json = InertiaJson {
             axis: name,
             frequency_hz: arguments.frequency,
-            feed_mm_min: arguments.feed_mm_min,
+            feed_mm_min,
             loads: found.iter().map(load).collect(),
         };
         write_json(&json, out)?;
     } else {
-        let (frequency, feed) = (arguments.frequency, arguments.feed_mm_min);
+        let (frequency, feed) = (arguments.frequency, feed_mm_min);
         writeln!(out, "Axis {name} at {frequency} Hz and {feed} mm/min under load, open loop\n")
             .and_then(|()| write_loads(found.iter().map(|(figures, _)| figures), out))
             .map_err(CliError::Output)?;

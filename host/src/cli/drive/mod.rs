@@ -6,12 +6,15 @@
 //! - [`circle`]: contour error over frequency;
 //! - [`compare`]: regulators side by side;
 //! - [`bode`]: the step's spectrum, harmonics and the linear model side by side;
+//! - [`excitation`]: the program to record; [`identify`]: an axis from a recording;
 //! - [`tune`]: identification, proposal, verification (`verification`).
 
 pub mod bode;
 pub mod circle;
 pub mod compare;
+pub mod excitation;
 pub mod harmonic;
+pub mod identify;
 pub mod inertia;
 pub mod step;
 pub mod tune;
@@ -29,6 +32,7 @@ use super::input;
 use super::outputs::{self, Written};
 use super::table::{self, Align};
 use crate::drive::Terms;
+use crate::drive::experiment::fastest_mm_s;
 use crate::drive::reference::Comparison;
 use crate::files::{Files, OutputFile};
 use crate::machine::Machine;
@@ -46,6 +50,8 @@ Examples:
   motion drive circle --report circle.html           contour error with V, VA and VAJ feedforward
   motion drive compare --report regulators.html      regulators side by side, with coarse set-points
   motion drive bode --axis Y --json                  curves from step, harmonics and the linear model
+  motion drive excitation --axis Y --output y.ngc    the program whose run shows the drive of Y
+  motion drive identify --axis Y --from y.csv        Y's drive from a recording of it
   motion drive tune --machine mine.toml --output mine.toml
                                                      identify the axes and set their regulators
 
@@ -69,6 +75,8 @@ enum Experiment {
     Circle(circle::CircleArguments),
     Compare(compare::CompareArguments),
     Bode(bode::BodeArguments),
+    Excitation(excitation::ExcitationArguments),
+    Identify(identify::IdentifyArguments),
     Tune(tune::TuneArguments),
 }
 
@@ -84,6 +92,8 @@ pub fn drive(arguments: &DriveArguments, out: &mut dyn Write) -> Result<Outcome,
         Experiment::Circle(arguments) => circle::run(arguments, out),
         Experiment::Compare(arguments) => compare::run(arguments, out),
         Experiment::Bode(arguments) => bode::run(arguments, out),
+        Experiment::Excitation(arguments) => excitation::run(arguments, out),
+        Experiment::Identify(arguments) => identify::run(arguments, out),
         Experiment::Tune(arguments) => tune::run(arguments, out),
     }
 }
@@ -161,6 +171,16 @@ fn axis_named(machine: &Machine, name: &str) -> Result<usize, CliError> {
         found: format!("axis {name}"),
         expected: "the name of an axis of the machine",
     })
+}
+
+/// The part of the greatest feed that an experiment takes which would ask for more.
+const REACH_SHARE: f64 = 0.9;
+
+/// The feed of an experiment \[mm/min\]: what was asked for, or else the published one, or nine tenths of what the
+/// outputs of `axes` reach if that is less.
+fn feed_mm_min(machine: &Machine, axes: &[usize], asked: Option<f64>, published: f64) -> f64 {
+    let reach_mm_min = REACH_SHARE * 60.0 * fastest_mm_s(machine, axes);
+    asked.unwrap_or(if published <= reach_mm_min { published } else { reach_mm_min.floor() })
 }
 
 /// `from`, `from + by`, … up to `to`.

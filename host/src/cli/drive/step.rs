@@ -6,7 +6,8 @@ use clap::Args;
 use serde::Serialize;
 
 use super::{
-    Common, ComparisonJson, axis_named, comparisons_json, is_feed, or_dash, outcome, write_comparisons,
+    Common, ComparisonJson, axis_named, comparisons_json, feed_mm_min, is_feed, or_dash, outcome,
+    write_comparisons,
 };
 use crate::cli::error::{CliError, Outcome};
 use crate::cli::write_json;
@@ -28,9 +29,9 @@ pub struct StepArguments {
     /// The axis, by its name.
     #[arg(long, value_name = "NAME", default_value = "X")]
     axis: String,
-    /// Velocity after the step, mm/min.
-    #[arg(long, value_name = "MM_MIN", default_value_t = 7200.0, allow_negative_numbers = true)]
-    feed_mm_min: f64,
+    /// Velocity after the step, mm/min; without it 7200, or what the machine reaches.
+    #[arg(long, value_name = "MM_MIN", allow_negative_numbers = true)]
+    feed_mm_min: Option<f64>,
     /// Time for which it is held and recorded, in seconds.
     #[arg(long, value_name = "S", default_value_t = 0.4, allow_negative_numbers = true)]
     duration_s: f64,
@@ -60,9 +61,10 @@ pub fn run(arguments: &StepArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     let machine = arguments.common.machine()?;
     let axis = axis_named(&machine, &arguments.axis)?;
     let report = arguments.common.report()?;
-    let step = Step { axis, feed_mm_s: arguments.feed_mm_min / 60.0, duration_s: arguments.duration_s };
+    let feed_mm_min = feed_mm_min(&machine, &[axis], arguments.feed_mm_min, 7200.0);
+    let step = Step { axis, feed_mm_s: feed_mm_min / 60.0, duration_s: arguments.duration_s };
     let (figures, response) = step.measure(&machine)?;
-    let is_published = is_feed(arguments.feed_mm_min, reference::STEP_FEED_MM_S) && axis == 0;
+    let is_published = is_feed(feed_mm_min, reference::STEP_FEED_MM_S) && axis == 0;
     let comparisons = if is_published && reference::is_reference(&machine) {
         reference::compare_step(&machine, &figures)?
     } else {
@@ -72,7 +74,7 @@ pub fn run(arguments: &StepArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     if arguments.common.json {
         let json = StepJson {
             axis: name,
-            feed_mm_min: arguments.feed_mm_min,
+            feed_mm_min,
             delay_ms: figures.delay_s * 1e3,
             time_constant_ms: figures.time_constant_s * 1e3,
             overshoot_percent: figures.overshoot * 1e2,
@@ -84,7 +86,7 @@ pub fn run(arguments: &StepArguments, out: &mut dyn Write) -> Result<Outcome, Cl
         };
         write_json(&json, out)?;
     } else {
-        writeln!(out, "Step of axis {name} from rest to {} mm/min, open loop\n", arguments.feed_mm_min)
+        writeln!(out, "Step of axis {name} from rest to {} mm/min, open loop\n", feed_mm_min)
             .and_then(|()| write_figures(&figures, out))
             .and_then(|()| write_comparisons(&comparisons, out))
             .map_err(CliError::Output)?;

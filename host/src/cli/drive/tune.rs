@@ -9,6 +9,7 @@ use clap::{Args, ValueEnum};
 use serde::Serialize;
 
 use super::axis_named;
+use super::identify::from_recording;
 use super::verification::{Verification, VerificationJson};
 use crate::cli::error::{CliError, Outcome};
 use crate::cli::outputs::{self, Written};
@@ -17,17 +18,18 @@ use crate::cli::write_json;
 use crate::drive::circle_motion::Circle;
 use crate::drive::identification::identify_axes;
 use crate::drive::learning::{LearningOptions, Learnt, Model, Reason, learn};
+use crate::drive::recorded::Scales;
 use crate::drive::reference::CIRCLE_FEED_MM_S;
-use crate::drive::verification::planes;
+use crate::drive::verification::{bears_mm_s2, planes};
 use crate::files::Files;
 use crate::identify::{Estimate, Identification};
-use crate::machine::{AxisEdit, Machine, REFERENCE_TOML, edited};
+use crate::machine::{AxisEdit, AxisSettings, Machine, REFERENCE_TOML, edited};
 use crate::simulate::StretchCorrection;
 use crate::tuning::{self, AxisTuning, TuningError, propose};
 
 const HELP: &str = "\
-All axes are simulated: those of the machine file, with its [axis.drive]. No axis of a real machine is moved or
-identified.
+All axes are simulated: those of the machine file, with its [axis.drive]. No axis of a real machine is moved. With --from
+one axis is identified from a recording of a real one, and the circles are driven by the model that was found.
 
 The command runs velocity steps and circles in open loop. From the converter's outputs and the encoders' counts it
 estimates the parameters of each drive. From these it derives a position gain, with its margins, and a feedforward. Then
@@ -43,9 +45,13 @@ Examples:
 
 JSON: axes: list of {name, found: {velocity_gain_per_s…: {value, half_width_95, determined}}, margins: {crossover_hz, phase_deg, gain,
 sensitivity}, changes: list of {key, before, after, unit, reason}, remarks}, verification: {feed_mm_min, circles: list of
-{axes, frequency_hz, before, after: {contour_error_um, form_deviation_um, following_error_first_um,
-following_error_second_um}}}, learning: null, or {repeats: list of {contour_error_um, following_error_um_rms of the three
-axes}, best_repeat, ended, robustness: list of {axis, filter_corner_hz, contraction, contraction_hz}}, output.
+{axes, frequency_hz, feed_mm_min, before, after: {contour_error_um, form_deviation_um, following_error_first_um,
+following_error_second_um}}, not_driven: list of {axes, frequency_hz, feed_mm_min, reason}}, learning: null, or {repeats: list of {contour_error_um, following_error_um_rms of the three
+axes}, best_repeat, ended, robustness: list of {axis, filter_corner_hz, contraction, contraction_hz}}, output, reason (null
+if the machine file was written; else why not, also where nothing could be tuned).
+
+Circles stay within what the outputs reach and the current limit that was found bears: a circle that is driven slower
+than the others, or not at all, is in not_driven.
 
 --learn-output: CSV with time_s from the stretch's first tick on, and a column of mm/s for each axis, added to
 feedforward and linear between rows; CorrectedIntake::correct hands it to the kernel. It has no rows if no correction was
@@ -62,6 +68,10 @@ pub struct TuneArguments {
     /// Axes to tune; without it, all.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     axis: Vec<String>,
+    /// Identify the one axis that --axis names from this recording, and move nothing: of `motion`, or CSV (see
+    /// `motion drive identify`).
+    #[arg(long, value_name = "FILE", requires = "axis")]
+    from: Option<PathBuf>,
     /// The method for feedforward.
     #[arg(long, value_enum, default_value_t = Method::Inverse)]
     method: Method,
@@ -143,21 +153,34 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
         lesson.circle.check(machine.tick_s)?;
         lesson.options.check(&machine)?;
     }
-    let found = identify_axes(&machine, &axes)?;
-    let tunings: Vec<Tuned> = axes
-        .iter()
-        .zip(found)
-        .map(|(&axis, found)| {
-            let tuning = propose(&machine.axes[axis], &found, arguments.method.into(), machine.tick_s)?;
-            Ok(Tuned { axis, found, tuning })
-        })
-        .collect::<Result<_, TuningError>>()?;
+    if arguments.from.is_some() && axes.len() != 1 {
+        let found = format!("--from with {} axes", axes.len());
+        return Err(CliError::Arguments { found, expected: "--axis with the one axis that was recorded" });
+    }
+    let tunings = match tunings(&machine, &axes, arguments) {
+        Ok(tunings) => tunings,
+        Err(error) => {
+            if arguments.json {
+                let (axes, verification, learning, output) = ([], None, None, None);
+                let reason = error.to_string();
+                write_json(&RefusalJson { axes, verification, learning, output, reason }, out)?;
+            }
+            return Err(error);
+        }
+    };
     // Verify exactly what the file will say.
     let edits: Vec<AxisEdit> = tunings.iter().map(Tuned::edit).collect();
     let text = edited(&source.name, &source.text, &edits)?;
     let tuned = Machine::from_toml(&source.name, &text)?;
-    let verification = Verification::new(&machine, &tuned, &axes)?;
-    let is_better = verification.is_better();
+    // A recorded axis is no simulated one: what is verified is the model that was found.
+    let (before, after) = match arguments.from {
+        Some(_) => (as_found(&machine, &tunings), as_found(&tuned, &tunings)),
+        None => (machine.clone(), tuned.clone()),
+    };
+    let bears: Vec<Option<f64>> = tunings.iter().map(|tuned| bears_mm_s2(&tuned.found)).collect();
+    let verification = Verification::new(&before, &after, &axes, &bears)?;
+    let worse = verification.reason();
+    let is_better = worse.is_none();
     let learnt = learning.map(|lesson| lesson.learn(&tuned, &tunings)).transpose()?;
     let mut written = Written::default();
     written.write("machine file", output.filter(|_| is_better), |file| file.write_all(text.as_bytes()));
@@ -167,21 +190,48 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     written.write("report", report, |file| verification.write_report(&tuned, file));
     if arguments.json {
         let output = written.place_of("machine file").map(str::to_owned);
-        write_json(&json(&machine, &tunings, &verification, learnt.as_ref(), output), out)?;
+        let reason = worse.or_else(|| output.is_none().then(|| "--output was not given".to_owned()));
+        write_json(&json(&machine, &tunings, &verification, learnt.as_ref(), (output, reason)), out)?;
     } else {
         write_words(&machine, &tunings, &verification, out).map_err(CliError::Output)?;
         if let Some(learnt) = &learnt {
             write_learnt(&tuned, learnt, arguments.learn_hz, out).map_err(CliError::Output)?;
         }
-        let end = match (&arguments.output, is_better) {
-            (_, false) => Some("  a circle got worse: no machine file is written"),
-            (None, true) => Some("  no machine file is written; --output FILE writes it"),
-            (Some(_), true) => None,
+        let end = match (&arguments.output, worse) {
+            (_, Some(worse)) => Some(format!("  no machine file is written: {worse}")),
+            (None, None) => Some("  no machine file is written; --output FILE writes it".to_owned()),
+            (Some(_), None) => None,
         };
         end.map_or(Ok(()), |end| writeln!(out, "{end}")).map_err(CliError::Output)?;
         written.say(out)?;
     }
     written.outcome(if is_better { Outcome::Done } else { Outcome::Failed })
+}
+
+/// `machine` with the drives that were found.
+fn as_found(machine: &Machine, tunings: &[Tuned]) -> Machine {
+    let mut machine = machine.clone();
+    for Tuned { axis, found, .. } in tunings {
+        machine.axes[*axis].drive = found.parameters.drive();
+    }
+    machine
+}
+
+/// Identifies the axes and proposes their settings.
+fn tunings(machine: &Machine, axes: &[usize], arguments: &TuneArguments) -> Result<Vec<Tuned>, CliError> {
+    let method = arguments.method.into();
+    let found = match (&arguments.from, axes) {
+        (Some(path), &[axis]) => {
+            let &AxisSettings { mm_s_at_10_v, mm_per_count, .. } = &machine.axes[axis];
+            vec![from_recording(machine, axis, path, Scales { mm_s_at_10_v, mm_per_count })?]
+        }
+        _ => identify_axes(machine, axes)?,
+    };
+    let tuned = axes.iter().zip(found).map(|(&axis, found)| {
+        let tuning = propose(&machine.axes[axis], &found, method, machine.tick_s)?;
+        Ok(Tuned { axis, found, tuning })
+    });
+    Ok(tuned.collect::<Result<_, TuningError>>()?)
 }
 
 /// The text of the machine file, or that of the reference machine.
@@ -354,6 +404,17 @@ struct TuneJson<'run> {
     verification: VerificationJson,
     learning: Option<LearningJson<'run>>,
     output: Option<String>,
+    reason: Option<String>,
+}
+
+/// What is told where nothing could be tuned.
+#[derive(Serialize)]
+struct RefusalJson {
+    axes: [(); 0],
+    verification: Option<()>,
+    learning: Option<()>,
+    output: Option<()>,
+    reason: String,
 }
 
 #[derive(Serialize)]
@@ -387,19 +448,52 @@ struct AxisJson<'run> {
     remarks: &'run [String],
 }
 
+/// What was found of an axis.
 #[derive(Serialize)]
-struct FoundJson {
+pub(super) struct FoundJson {
     command_gain: EstimateJson,
     command_offset_mm_s: EstimateJson,
     velocity_gain_per_s: EstimateJson,
     integral_time_s: EstimateJson,
     dead_time_s: EstimateJson,
+    command_filter_s: EstimateJson,
     current_lag_s: EstimateJson,
     total_delay_s: EstimateJson,
     accel_limit_mm_s2: EstimateJson,
     coulomb_friction_mm_s2: EstimateJson,
     viscous_friction_per_s: EstimateJson,
+    load_inertia_ratio: EstimateJson,
     bed: Option<BedJson>,
+}
+
+impl FoundJson {
+    pub(super) fn of(found: &Identification) -> Self {
+        let parameters = &found.parameters;
+        let estimate = |estimate: Estimate| EstimateJson {
+            value: estimate.value,
+            half_width_95: Some(estimate.half_width_95).filter(|width| width.is_finite()),
+            determined: estimate.is_determined(),
+        };
+        FoundJson {
+            command_gain: estimate(parameters.command_gain),
+            command_offset_mm_s: estimate(parameters.command_offset_mm_s),
+            velocity_gain_per_s: estimate(parameters.velocity_gain_per_s),
+            integral_time_s: estimate(parameters.integral_time_s),
+            dead_time_s: estimate(parameters.dead_time_s),
+            command_filter_s: estimate(parameters.command_filter_s),
+            current_lag_s: estimate(parameters.current_lag_s),
+            total_delay_s: estimate(parameters.total_delay_s),
+            accel_limit_mm_s2: estimate(parameters.accel_limit_mm_s2),
+            coulomb_friction_mm_s2: estimate(parameters.coulomb_friction_mm_s2),
+            viscous_friction_per_s: estimate(parameters.viscous_friction_per_s),
+            load_inertia_ratio: estimate(parameters.load_inertia_ratio),
+            bed: parameters.bed.map(|bed| BedJson {
+                frequency_hz: estimate(bed.frequency_hz),
+                damping_ratio: estimate(bed.damping_ratio),
+                mass_ratio: estimate(bed.mass_ratio),
+            }),
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -439,7 +533,7 @@ fn json<'run>(
     tunings: &'run [Tuned],
     verification: &Verification,
     learnt: Option<&Learnt>,
-    output: Option<String>,
+    (output, reason): (Option<String>, Option<String>),
 ) -> TuneJson<'run> {
     TuneJson {
         axes: tunings.iter().map(|tuned| axis_json(&machine.axes[tuned.axis].name, tuned)).collect(),
@@ -469,35 +563,15 @@ fn json<'run>(
                 .collect(),
         }),
         output,
+        reason,
     }
 }
 
 fn axis_json<'run>(name: &'run str, Tuned { found, tuning, .. }: &'run Tuned) -> AxisJson<'run> {
-    let estimate = |estimate: Estimate| EstimateJson {
-        value: estimate.value,
-        half_width_95: Some(estimate.half_width_95).filter(|width| width.is_finite()),
-        determined: estimate.is_determined(),
-    };
-    let (parameters, margins) = (&found.parameters, &tuning.margins);
+    let margins = &tuning.margins;
     AxisJson {
         name,
-        found: FoundJson {
-            command_gain: estimate(parameters.command_gain),
-            command_offset_mm_s: estimate(parameters.command_offset_mm_s),
-            velocity_gain_per_s: estimate(parameters.velocity_gain_per_s),
-            integral_time_s: estimate(parameters.integral_time_s),
-            dead_time_s: estimate(parameters.dead_time_s),
-            current_lag_s: estimate(parameters.current_lag_s),
-            total_delay_s: estimate(parameters.total_delay_s),
-            accel_limit_mm_s2: estimate(parameters.accel_limit_mm_s2),
-            coulomb_friction_mm_s2: estimate(parameters.coulomb_friction_mm_s2),
-            viscous_friction_per_s: estimate(parameters.viscous_friction_per_s),
-            bed: parameters.bed.map(|bed| BedJson {
-                frequency_hz: estimate(bed.frequency_hz),
-                damping_ratio: estimate(bed.damping_ratio),
-                mass_ratio: estimate(bed.mass_ratio),
-            }),
-        },
+        found: FoundJson::of(found),
         margins: MarginsJson {
             crossover_hz: margins.crossover_hz,
             phase_deg: margins.phase_deg,

@@ -1,4 +1,7 @@
 //! Circles before and after tuning, in as many planes as let every tuned axis move.
+//!
+//! Every circle stays within what its axes bear: the feed of S4's circles, or less where the outputs or the current
+//! limits that were found do not reach it. A circle that can't be driven all the same is named and not judged.
 
 use std::io::{self, Write};
 
@@ -7,9 +10,11 @@ use serde::Serialize;
 use super::super::error::CliError;
 use super::super::progress::Progress;
 use super::super::table::{self, Align};
+use crate::drive::DriveError;
 use crate::drive::circle::{CircleFigures, Sweep, figures};
+use crate::drive::circle_motion::Circle;
 use crate::drive::reference::CIRCLE_FEED_MM_S;
-use crate::drive::verification::{VERIFIED_HZ, circle, is_no_worse, planes};
+use crate::drive::verification::{VERIFIED_HZ, Verdict, circle, planes};
 use crate::gcode::Plane;
 use crate::machine::Machine;
 use crate::report::{self, drive::Shown};
@@ -18,11 +23,23 @@ use crate::report::{self, drive::Shown};
 const SHOWN_HZ: [f64; 2] = [4.0, 13.0];
 /// The contour error that S4 asks for \[µm\].
 const LIMIT_UM: f64 = 20.0;
-
 /// Circles before and after.
 pub(super) struct Verification {
     planes: Vec<Verified>,
     shown: Vec<Shown>,
+    not_driven: Vec<NotDriven>,
+}
+
+/// A circle that was not driven as it should.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct NotDriven {
+    axes: [String; 2],
+    frequency_hz: f64,
+    feed_mm_min: f64,
+    reason: String,
+    /// Whether the machine could drive it before, and no more.
+    #[serde(skip)]
+    is_worse: bool,
 }
 
 /// The circles of one plane.
@@ -38,36 +55,27 @@ impl Verified {
         self.before.circles.iter().zip(&self.after.circles)
     }
 
-    /// Whether no circle got worse, but for the encoders' rounding.
-    fn is_better(&self) -> bool {
-        self.pairs().all(|(before, after)| is_no_worse(&self.after.machine, self.is_tuned, before, after))
+    fn verdict(&self) -> Verdict<'_> {
+        Verdict { machine: &self.after.machine, is_tuned: self.is_tuned }
     }
 }
 
 impl Verification {
-    /// Drives the circles on the machine `before` and `after` tuning the axes `tuned`.
+    /// Drives the circles on the machine `before` and `after` tuning the axes `tuned`, within the accelerations
+    /// that they bear \[mm/s²\], as far as that was found.
     ///
     /// # Errors
-    /// A circle can't be driven.
-    pub(super) fn new(before: &Machine, after: &Machine, tuned: &[usize]) -> Result<Self, CliError> {
+    /// A circle is out of an experiment's ranges.
+    pub(super) fn new(
+        before: &Machine,
+        after: &Machine,
+        tuned: &[usize],
+        bears_mm_s2: &[Option<f64>],
+    ) -> Result<Self, CliError> {
         let planes = planes(tuned);
-        let mut progress = Progress::new((2 * planes.len() * VERIFIED_HZ.len()) as u64);
+        let mut progress = Progress::new((planes.len() * VERIFIED_HZ.len()) as u64);
         let mut shown = Vec::new();
-        let mut sweep = |name: &'static str, machine: &Machine, plane: Plane| -> Result<Sweep, CliError> {
-            let mut circles = Vec::with_capacity(VERIFIED_HZ.len());
-            for frequency_hz in VERIFIED_HZ {
-                let circle = circle(plane, frequency_hz);
-                let recording = circle.record(machine)?;
-                circles.push(figures(&recording, &circle)?);
-                if SHOWN_HZ.contains(&frequency_hz) {
-                    shown.push((name, circle, recording));
-                }
-                progress.step();
-            }
-            let within = |figures: &&CircleFigures| figures.contour_um() <= LIMIT_UM;
-            let limit_hz = circles.iter().take_while(within).last().map(|figures| figures.frequency_hz);
-            Ok(Sweep { name, machine: machine.clone(), circles, limit_hz })
-        };
+        let mut not_driven = Vec::new();
         let mut verified = Vec::with_capacity(planes.len());
         for plane in planes {
             let [was, is] = match plane {
@@ -76,17 +84,82 @@ impl Verification {
                 Plane::Yz => ["before, YZ", "after, YZ"],
             };
             let [first, second, _] = plane.axes();
-            let is_tuned = [first, second].map(|axis| tuned.contains(&axis));
-            let (before, after) = (sweep(was, before, plane)?, sweep(is, after, plane)?);
+            let axes = [first, second];
+            let names = axes.map(|axis| after.axes[axis].name.clone());
+            let of_tuned = tuned.iter().zip(bears_mm_s2).filter(|(axis, _)| axes.contains(axis));
+            let bears_mm_s2 = of_tuned.filter_map(|(_, bears)| *bears).fold(f64::INFINITY, f64::min);
+            let mut circles = [Vec::new(), Vec::new()];
+            for frequency_hz in VERIFIED_HZ {
+                let not = |feed_mm_s: f64, reason: String, is_worse| NotDriven {
+                    axes: names.clone(),
+                    frequency_hz,
+                    feed_mm_min: feed_mm_s * 60.0,
+                    reason,
+                    is_worse,
+                };
+                let (circle, slower) = circle(plane, frequency_hz, before, bears_mm_s2);
+                let feed_mm_s = circle.feed_mm_s;
+                if let Some(reason) = slower {
+                    let slower = format!("{reason}: driven at {:.0} mm/min instead", feed_mm_s * 60.0);
+                    not_driven.push(not(CIRCLE_FEED_MM_S, slower, false));
+                }
+                let drive = |machine: &Machine| {
+                    let recording = circle.record(machine)?;
+                    Ok((figures(&recording, &circle)?, recording))
+                };
+                let both: [Result<_, DriveError>; 2] = [drive(before), drive(after)];
+                progress.step();
+                match both {
+                    [Ok(before), Ok(after)] => {
+                        for ((figures, recording), (name, circles)) in
+                            [before, after].into_iter().zip([was, is].into_iter().zip(&mut circles))
+                        {
+                            circles.push(figures);
+                            if SHOWN_HZ.contains(&frequency_hz) {
+                                shown.push((name, circle, recording));
+                            }
+                        }
+                    }
+                    [Err(error), _] => not_driven.push(not(feed_mm_s, format!("before: {error}"), false)),
+                    [Ok(_), Err(error)] => not_driven.push(not(feed_mm_s, format!("after: {error}"), true)),
+                }
+            }
+            let [before, after] = [(was, before), (is, after)].map(|(name, machine)| (name, machine.clone()));
+            let sweep = |(name, machine), circles: Vec<CircleFigures>| {
+                let within = |figures: &&CircleFigures| figures.contour_um() <= LIMIT_UM;
+                let limit_hz = circles.iter().take_while(within).last().map(|figures| figures.frequency_hz);
+                Sweep { name, machine, circles, limit_hz }
+            };
+            let [of_before, of_after] = circles;
+            let is_tuned = axes.map(|axis| tuned.contains(&axis));
+            let (before, after) = (sweep(before, of_before), sweep(after, of_after));
             verified.push(Verified { is_tuned, before, after });
         }
         progress.finish();
-        Ok(Self { planes: verified, shown })
+        Ok(Self { planes: verified, shown, not_driven })
     }
 
-    /// Whether no circle got worse.
-    pub(super) fn is_better(&self) -> bool {
-        self.planes.iter().all(Verified::is_better)
+    /// Why the machine is not better, if it is not.
+    pub(super) fn reason(&self) -> Option<String> {
+        if let Some(lost) = self.not_driven.iter().find(|circle| circle.is_worse) {
+            return Some(format!(
+                "the circle at {} Hz can't be driven any more, {}",
+                lost.frequency_hz, lost.reason
+            ));
+        }
+        if self.planes.iter().all(|plane| plane.before.circles.is_empty()) {
+            return Some("no circle could be driven, so nothing was verified".to_owned());
+        }
+        self.planes.iter().find_map(|plane| {
+            let verdict = plane.verdict();
+            let (before, after) = plane.pairs().find(|(before, after)| !verdict.is_no_worse(before, after))?;
+            Some(format!(
+                "the circle at {} Hz got worse: {:.2} µm before, {:.2} µm after",
+                before.frequency_hz,
+                verdict.judged_um(before),
+                verdict.judged_um(after)
+            ))
+        })
     }
 
     /// The page of the circles.
@@ -101,13 +174,10 @@ impl Verification {
         for plane in &self.planes {
             let axes = plane.after.circles.first().map_or([0, 1], |circle| circle.axes);
             let [first, second] = axes.map(|axis| plane.after.machine.axes[axis].name.as_str());
-            writeln!(
-                out,
-                "Circles of {first} and {second} at {:.0} mm/min, before and after\n",
-                CIRCLE_FEED_MM_S * 60.0
-            )?;
+            writeln!(out, "Circles of {first} and {second}, before and after\n")?;
             let columns = [
                 ("frequency", "Hz", Align::Right),
+                ("feed", "mm/min", Align::Right),
                 ("contour", "µm", Align::Right),
                 ("", "µm", Align::Right),
                 ("form deviation", "µm", Align::Right),
@@ -117,12 +187,13 @@ impl Verification {
                 ("second axis", "µm", Align::Right),
                 ("", "µm", Align::Right),
             ];
-            let rows: Vec<[String; 9]> = plane
+            let rows: Vec<[String; 10]> = plane
                 .pairs()
                 .map(|(before, after)| {
                     let um = |value: f64| format!("{value:.2}");
                     [
                         before.frequency_hz.to_string(),
+                        format!("{:.0}", before.feed_mm_s * 60.0),
                         um(before.contour_um()),
                         um(after.contour_um()),
                         um(before.form_um()),
@@ -136,6 +207,12 @@ impl Verification {
                 .collect();
             table::write(&columns, &rows, out)?;
             writeln!(out)?;
+        }
+        for NotDriven { axes: [first, second], frequency_hz, feed_mm_min, reason, .. } in &self.not_driven {
+            writeln!(
+                out,
+                "  {first} and {second} at {frequency_hz} Hz and {feed_mm_min:.0} mm/min: {reason}"
+            )?;
         }
         Ok(())
     }
@@ -151,6 +228,7 @@ impl Verification {
         let pair = |(before, after): (&CircleFigures, &CircleFigures), machine: &Machine| PairJson {
             axes: before.axes.map(|axis| machine.axes[axis].name.clone()),
             frequency_hz: before.frequency_hz,
+            feed_mm_min: before.feed_mm_s * 60.0,
             before: circle(before),
             after: circle(after),
         };
@@ -160,6 +238,7 @@ impl Verification {
         VerificationJson {
             feed_mm_min: CIRCLE_FEED_MM_S * 60.0,
             circles: self.planes.iter().flat_map(pairs).collect(),
+            not_driven: self.not_driven.clone(),
         }
     }
 }
@@ -168,12 +247,14 @@ impl Verification {
 pub(super) struct VerificationJson {
     feed_mm_min: f64,
     circles: Vec<PairJson>,
+    not_driven: Vec<NotDriven>,
 }
 
 #[derive(Serialize)]
 struct PairJson {
     axes: [String; 2],
     frequency_hz: f64,
+    feed_mm_min: f64,
     before: CircleJson,
     after: CircleJson,
 }

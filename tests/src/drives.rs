@@ -1,0 +1,321 @@
+//! Random servo axes, and what identification says of them against what they are.
+//!
+//! Every parameter varies at once, far beyond those of the published machine: gains, lags, dead times, command
+//! filters, friction, load, beds, encoders with noise. A seed is a drive, everywhere.
+
+use hal_sim::{
+    AxisParameters, BedMode, DriveParameters, EncoderNoise, EncoderParameters, REFERENCE_ENCODER,
+    REFERENCE_MM_S_PER_VOLT, REFERENCE_SUBSTEPS, REFERENCE_TICK_S, SimAxis,
+};
+use motion_host::identify::{
+    AxisParametersFound, AxisRecording, Estimate, Excitation, Identification, explore, identify,
+};
+use motion_host::machine::Machine;
+use motion_host::tuning::{Margins, Method, propose};
+use motion_kernel::units::DacCode;
+
+use crate::random::Random;
+
+/// Cells for the dead time: 12 ms at the reference's sub-steps.
+const LINE: usize = 512;
+
+/// What the drives reach through their converters \[mm/s\].
+const FASTEST_MM_S: f64 = 10.0 * REFERENCE_MM_S_PER_VOLT;
+
+/// An axis that was drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct RandomAxis {
+    /// The seed it was drawn with.
+    pub seed: u64,
+    /// Drive and mechanics.
+    pub drive: DriveParameters,
+    /// Travel per count, and noise.
+    pub encoder: EncoderParameters,
+    /// Where it stands at the start \[mm\]: not on a count.
+    pub start_mm: f64,
+}
+
+impl RandomAxis {
+    /// The axis of a seed.
+    ///
+    /// Velocity loops are those that somebody would have let run: with Kv·Ti ≥ 1.5 they are damped by 0.6, and
+    /// with Kv·Tc ≤ 0.5 the current loop is faster.
+    #[must_use]
+    pub fn new(seed: u64) -> Self {
+        let mut random = Random::new(seed);
+        let load_inertia_ratio = if random.chance(0.5) { 0.0 } else { random.between(0.0, 3.0) };
+        let inertia = 1.0 + load_inertia_ratio;
+        let gain_per_s = random.log(60.0, 1000.0);
+        let accel_limit_mm_s2 = random.log(3000.0, 30_000.0);
+        let moved_per_s = gain_per_s / inertia;
+        let command_filter_s = if random.chance(0.5) { 0.0 } else { random.log(1e-4, 4e-3) };
+        let bed = random.chance(0.5).then(|| BedMode {
+            frequency_hz: random.log(5.0, 120.0),
+            damping_ratio: random.log(0.005, 0.1),
+            mass_ratio: random.log(0.01, 0.3),
+        });
+        let drive = DriveParameters {
+            velocity_gain_per_s: gain_per_s,
+            integral_time_s: random.log((1.5 / moved_per_s).max(5e-3), 0.5),
+            current_lag_s: random.log(1e-4, (0.5 / moved_per_s).clamp(2e-4, 2e-3)),
+            dead_time_s: random.between(0.0, 4e-3),
+            command_filter_s,
+            accel_limit_mm_s2,
+            load_inertia_ratio,
+            coulomb_friction_mm_s2: random.log(8.5, 2550.0_f64.min(0.5 * accel_limit_mm_s2)),
+            viscous_friction_per_s: random.log(0.01, 3.0),
+            bed,
+        };
+        let noise = random
+            .chance(0.5)
+            .then(|| EncoderNoise { amplitude_counts: 1 + random.below(2) as u16, seed: random.bits() });
+        let encoder = EncoderParameters { resolution_mm: random.log(1e-4, 5e-3), noise, ..REFERENCE_ENCODER };
+        Self { seed, drive, encoder, start_mm: random.between(10.0, 11.0) }
+    }
+
+    /// The axis from rest, in open loop, through a converter of 16 bits.
+    ///
+    /// # Panics
+    /// The axis can't be simulated, which is the generator's error.
+    #[must_use]
+    pub fn record(&self, excitation: &Excitation, run: u64) -> AxisRecording {
+        let noise = self.encoder.noise.map(|noise| EncoderNoise { seed: noise.seed ^ run, ..noise });
+        let start_position_mm = self.start_mm + 0.012_345 * run as f64;
+        let parameters = AxisParameters {
+            drive: self.drive,
+            encoder: EncoderParameters { noise, ..self.encoder },
+            start_position_mm,
+            ..AxisParameters::REFERENCE_X
+        };
+        let mut axis = SimAxis::<LINE>::new(parameters, REFERENCE_TICK_S, REFERENCE_SUBSTEPS)
+            .unwrap_or_else(|error| panic!("seed {}: {error}", self.seed));
+        let mut recording = AxisRecording {
+            tick_s: REFERENCE_TICK_S,
+            harmonic_hz: excitation.harmonic_hz(),
+            ..Default::default()
+        };
+        for velocity_mm_s in excitation.velocity_mm_s(REFERENCE_TICK_S) {
+            let code = DacCode::from_volts(velocity_mm_s / REFERENCE_MM_S_PER_VOLT);
+            recording.actual_mm.push(axis.latch().0 as f64 * self.encoder.resolution_mm);
+            recording.command_mm_s.push(code.to_volts() * REFERENCE_MM_S_PER_VOLT);
+            axis.advance(code.to_volts(), true);
+        }
+        recording
+    }
+}
+
+/// A parameter's true value and what was found.
+#[derive(Clone, Copy, Debug)]
+pub struct Compared {
+    /// The parameter's key in `found`.
+    pub name: &'static str,
+    /// What it is.
+    pub truth: f64,
+    /// What was found.
+    pub found: Estimate,
+}
+
+impl Compared {
+    /// |found − true| in half-widths of the interval.
+    #[must_use]
+    pub fn half_widths_off(&self) -> f64 {
+        (self.found.value - self.truth).abs() / self.found.half_width_95
+    }
+}
+
+/// Every parameter that was found, per unit of the inertia moved; those of the bed if there is one and one
+/// was found.
+#[must_use]
+pub fn compared(axis: &RandomAxis, found: &AxisParametersFound) -> Vec<Compared> {
+    let drive = &axis.drive;
+    let inertia = 1.0 + drive.load_inertia_ratio;
+    let delay_s = drive.dead_time_s + drive.command_filter_s + drive.current_lag_s + 0.5 * REFERENCE_TICK_S;
+    let of = |name, truth, found| Compared { name, truth, found };
+    let mut all = vec![
+        of("command_gain", 1.0, found.command_gain),
+        of("command_offset_mm_s", 0.0, found.command_offset_mm_s),
+        of("velocity_gain_per_s", drive.velocity_gain_per_s / inertia, found.velocity_gain_per_s),
+        of("integral_time_s", drive.integral_time_s, found.integral_time_s),
+        of("dead_time_s", drive.dead_time_s, found.dead_time_s),
+        of("current_lag_s", drive.current_lag_s, found.current_lag_s),
+        of("command_filter_s", drive.command_filter_s, found.command_filter_s),
+        of("total_delay_s", delay_s, found.total_delay_s),
+        of("accel_limit_mm_s2", drive.accel_limit_mm_s2 / inertia, found.accel_limit_mm_s2),
+        of("coulomb_friction_mm_s2", drive.coulomb_friction_mm_s2 / inertia, found.coulomb_friction_mm_s2),
+        of("viscous_friction_per_s", drive.viscous_friction_per_s / inertia, found.viscous_friction_per_s),
+    ];
+    if let (Some(truth), Some(found)) = (drive.bed, found.bed) {
+        all.push(of("bed.frequency_hz", truth.frequency_hz, found.frequency_hz));
+        all.push(of("bed.damping_ratio", truth.damping_ratio, found.damping_ratio));
+        all.push(of("bed.mass_ratio", truth.mass_ratio, found.mass_ratio));
+    }
+    all
+}
+
+/// What identification said of one drive.
+#[derive(Clone, Debug)]
+pub struct Surveyed {
+    /// The drive.
+    pub axis: RandomAxis,
+    /// Every parameter, or why there is none.
+    pub found: Result<Vec<Compared>, String>,
+    /// Whether it says that there is a bed.
+    pub has_bed: bool,
+    /// Whether it says that the model explains the recordings.
+    pub is_met: bool,
+    /// The margins of the loop that is proposed: as they are claimed, and those of the drive as it is. Without, tuning
+    /// was refused.
+    pub margins: Option<[Margins; 2]>,
+    /// Time that it took \[s\]: of the processor, where the system tells it.
+    pub time_s: f64,
+}
+
+impl Surveyed {
+    /// What is to be said of it, in a line.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let seed = self.axis.seed;
+        let found = match &self.found {
+            Ok(found) => found,
+            Err(error) => return format!("seed {seed}: refused: {error}"),
+        };
+        let worst = found.iter().max_by(|a, b| a.half_widths_off().total_cmp(&b.half_widths_off()));
+        let worst =
+            worst.map_or_else(String::new, |one| format!("{} {:.1}", one.name, one.half_widths_off()));
+        let bed = match (self.axis.drive.bed, self.has_bed) {
+            (Some(bed), false) => format!(", bed missed at a mass ratio of {:.3}", bed.mass_ratio),
+            (None, true) => ", a bed that is not there".to_owned(),
+            _ => String::new(),
+        };
+        let met = if self.is_met { "" } else { ", says that the model does not follow" };
+        format!("seed {seed}: half-widths off: {worst}{bed}{met}, {:.1} s", self.time_s)
+    }
+}
+
+/// The drive of a seed, recorded and identified.
+#[must_use]
+pub fn surveyed(seed: u64) -> Surveyed {
+    let axis = RandomAxis::new(seed);
+    let mut run = 0;
+    let runs = explore(REFERENCE_TICK_S, FASTEST_MM_S, |excitation| {
+        run += 1;
+        Ok::<_, core::convert::Infallible>(axis.record(excitation, run))
+    });
+    let Ok(runs) = runs;
+    let start_s = processor_s();
+    let found = identify(&runs);
+    let time_s = processor_s() - start_s;
+    let has_bed = found.as_ref().is_ok_and(|found| found.parameters.bed.is_some());
+    let is_met = found.as_ref().is_ok_and(Identification::is_met);
+    let margins = found.as_ref().ok().and_then(|found| margins(&axis, found));
+    let found = match found {
+        Ok(found) => Ok(compared(&axis, &found.parameters)),
+        Err(error) => Err(error.to_string()),
+    };
+    Surveyed { axis, found, has_bed, is_met, margins, time_s }
+}
+
+/// The proposed loop's margins in the drive that was found, and in the true one.
+fn margins(axis: &RandomAxis, found: &Identification) -> Option<[Margins; 2]> {
+    let mut settings = Machine::reference().axes[0].clone();
+    settings.mm_per_count = axis.encoder.resolution_mm;
+    let tuning = propose(&settings, found, Method::Inverse, REFERENCE_TICK_S).ok()?;
+    Some([tuning.margins, Margins::of(&axis.drive, tuning.gains.kp_per_s, REFERENCE_TICK_S)])
+}
+
+/// By how much phase and gain margin are off, as a part of the true ones.
+fn margins_off([claimed, is]: &[Margins; 2]) -> f64 {
+    // The gain margin of a loop without any is infinite in both.
+    let off = |claimed: f64, is: f64| if claimed == is { 0.0 } else { (claimed / is - 1.0).abs() };
+    off(claimed.phase_deg, is.phase_deg).max(off(claimed.gain, is.gain))
+}
+
+/// The time that this thread has had of a processor \[s\]; of the clock where the system does not tell.
+fn processor_s() -> f64 {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let ns = told.and_then(|told| told.split_whitespace().next()?.parse::<f64>().ok());
+    ns.map_or_else(
+        || std::time::UNIX_EPOCH.elapsed().map_or(0.0, |since| since.as_secs_f64()),
+        |ns| ns * 1e-9,
+    )
+}
+
+/// The figures of many drives, as text with tables.
+#[must_use]
+pub fn report(all: &[Surveyed]) -> String {
+    let mut text = String::new();
+    let seeds = (all.first().map_or(0, |first| first.axis.seed), all.last().map_or(0, |last| last.axis.seed));
+    let with_bed = || all.iter().filter(|one| one.axis.drive.bed.is_some() && one.found.is_ok());
+    let rigid = || all.iter().filter(|one| one.axis.drive.bed.is_none() && one.found.is_ok());
+    let count = |of: &mut dyn Iterator<Item = &Surveyed>| of.count();
+    let missed: Vec<&Surveyed> = with_bed().filter(|one| !one.has_bed).collect();
+    let mass_ratio = |one: &Surveyed| one.axis.drive.bed.map_or(0.0, |bed| bed.mass_ratio);
+    let missed_ratio = missed.iter().map(|one| mass_ratio(one)).fold(0.0, f64::max);
+    let mut times_s: Vec<f64> = all.iter().map(|one| one.time_s).collect();
+    times_s.sort_by(f64::total_cmp);
+    let at = |share: f64| {
+        times_s.get((share * (times_s.len().max(1) - 1) as f64) as usize).copied().unwrap_or(0.0)
+    };
+    // Writing to a string does not fail.
+    let mut line = |words: String| {
+        text.push_str(&words);
+        text.push('\n');
+    };
+    line(format!("{} drives, seeds {} to {}.\n", all.len(), seeds.0, seeds.1));
+    line("| drives | number |".to_owned());
+    line("|---|---:|".to_owned());
+    line(format!("| refused | {} |", count(&mut all.iter().filter(|one| one.found.is_err()))));
+    line(format!(
+        "| said that the model does not explain the recordings | {} |",
+        count(&mut all.iter().filter(|one| one.found.is_ok() && !one.is_met))
+    ));
+    line(format!("| with a bed | {} |", with_bed().count()));
+    line(format!("| bed missed (mass ratio up to {missed_ratio:.3}) | {} |", missed.len()));
+    line(format!("| without a bed | {} |", rigid().count()));
+    line(format!("| bed that is not there | {} |", rigid().filter(|one| one.has_bed).count()));
+    line(format!(
+        "| not tuned: too little is determined | {} |",
+        count(&mut all.iter().filter(|one| one.margins.is_none()))
+    ));
+    let margins: Vec<f64> = all.iter().filter_map(|one| one.margins.as_ref()).map(margins_off).collect();
+    let worst_part = 100.0 * margins.iter().copied().fold(0.0, f64::max);
+    line(format!(
+        "| margins off by over 2 % (at most {worst_part:.2} %) | {} |",
+        margins.iter().filter(|off| !(**off <= 0.02)).count()
+    ));
+    line(format!(
+        "\nProcessor time of an identification: median {:.1} s, 95 % below {:.1} s, at most {:.1} s.\n",
+        at(0.5),
+        at(0.95),
+        at(1.0)
+    ));
+    line(
+        "| parameter | cases | truth in the 95 % interval | off by over 4 half-widths | worst | its seed |"
+            .to_owned(),
+    );
+    line("|---|---:|---:|---:|---:|---:|".to_owned());
+    let names: Vec<&str> = all
+        .iter()
+        .filter_map(|one| one.found.as_ref().ok())
+        .max_by_key(|found| found.len())
+        .map_or_else(Vec::new, |found| found.iter().map(|one| one.name).collect());
+    for name in names {
+        let mut off: Vec<(f64, u64)> = Vec::new();
+        for one in all {
+            let of_name = one.found.iter().flatten().filter(|compared| compared.name == name);
+            off.extend(of_name.map(|compared| (compared.half_widths_off(), one.axis.seed)));
+        }
+        let within = off.iter().filter(|(off, _)| *off <= 1.0).count();
+        let beyond = off.iter().filter(|(off, _)| !(*off <= 4.0)).count();
+        let (worst, seed) = off.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, 0));
+        let share = 100.0 * within as f64 / off.len().max(1) as f64;
+        line(format!("| `{name}` | {} | {share:.1} % | {beyond} | {worst:.1} | {seed} |", off.len()));
+    }
+    line(String::new());
+    let is_off = |one: &Surveyed| one.found.iter().flatten().any(|one| !(one.half_widths_off() <= 4.0));
+    let is_right = |one: &Surveyed| one.is_met && one.has_bed == one.axis.drive.bed.is_some() && !is_off(one);
+    for one in all.iter().filter(|one| !is_right(one)) {
+        line(format!("- {}", one.words()));
+    }
+    text
+}
