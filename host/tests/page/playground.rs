@@ -167,7 +167,7 @@ fn assert_same_bits(requests: &[Value], answers: &Value) {
     let answers = answers.as_array().expect("a list");
     assert_eq!(answers.len(), requests.len());
     for (request, answer) in requests.iter().zip(answers) {
-        assert_eq!(told(answer), natively(request), "{request}");
+        assert_eq!(told(answer), natively(request), "{} {}", request["edits"], request["program"]);
     }
     let digests = answers.iter().filter(|answer| answer["digest"].is_string()).count();
     assert!(10 * digests >= 9 * requests.len(), "{digests} of {} programs were run", requests.len());
