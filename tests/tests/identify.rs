@@ -255,7 +255,7 @@ fn a_few_drives_are_found_with_every_encoder() {
 }
 
 #[test]
-#[ignore = "takes three minutes; tuning.rs finds fifty drives through the kernel"]
+#[ignore = "takes three minutes; tuning.rs finds twelve drives through the kernel"]
 fn fifty_drives_are_found_with_every_encoder() {
     for resolution_um in RESOLUTIONS_UM {
         let of_seed =

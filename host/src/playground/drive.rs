@@ -425,7 +425,8 @@ fn compare(bench: &mut Bench, index: usize, plane: Plane, frequency_hz: f64) -> 
             let is_worse = !verdict.is_no_worse(before, &after);
             let of = |circle: &CircleFigures| (circle.contour_um(), circle.form_um());
             let ((contour, form), (contour_after, form_after)) = (of(before), of(&after));
-            let figures = [before.feed_mm_s * 60.0, contour, contour_after, form, form_after].map(Cell::Number);
+            let figures =
+                [before.feed_mm_s * 60.0, contour, contour_after, form, form_after].map(Cell::Number);
             let verdict = words(if is_worse { "worse" } else { "no worse" });
             (figures.into_iter().chain([verdict]).collect::<Vec<_>>(), is_worse)
         }

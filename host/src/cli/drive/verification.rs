@@ -12,7 +12,6 @@ use super::super::progress::Progress;
 use super::super::table::{self, Align};
 use crate::drive::DriveError;
 use crate::drive::circle::{CircleFigures, Sweep, figures};
-use crate::drive::circle_motion::Circle;
 use crate::drive::reference::CIRCLE_FEED_MM_S;
 use crate::drive::verification::{VERIFIED_HZ, Verdict, circle, planes};
 use crate::gcode::Plane;
@@ -152,7 +151,8 @@ impl Verification {
         }
         self.planes.iter().find_map(|plane| {
             let verdict = plane.verdict();
-            let (before, after) = plane.pairs().find(|(before, after)| !verdict.is_no_worse(before, after))?;
+            let (before, after) =
+                plane.pairs().find(|(before, after)| !verdict.is_no_worse(before, after))?;
             Some(format!(
                 "the circle at {} Hz got worse: {:.2} µm before, {:.2} µm after",
                 before.frequency_hz,
