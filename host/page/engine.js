@@ -2,7 +2,7 @@
 //
 // A request that is not needed any more is dropped with its worker, if it takes long; another worker is started for the next.
 
-/** A request that has been under way for longer gives way to the next at once [ms]. */
+/** A request that has been under way for longer gives way to one that waits [ms]. */
 const PATIENCE_MS = 400;
 
 /** What a module does, by its numbers. */
@@ -28,9 +28,20 @@ export class Engine {
     return new Promise((resolve, reject) => {
       this.next?.resolve(null);
       this.next = { request, resolve, reject };
-      if (this.current && performance.now() - this.current.since > PATIENCE_MS) this.cancel();
-      else this.go();
+      this.go();
+      // Whatever takes longer than this gives way, now or later.
+      clearTimeout(this.impatient);
+      if (!this.next) return;
+      const left = PATIENCE_MS - (performance.now() - this.current.since);
+      this.impatient = setTimeout(() => this.next && this.cancel(), Math.max(0, left));
     });
+  }
+
+  /** Drops what is under way, and what waits. */
+  drop() {
+    this.next?.resolve(null);
+    this.next = null;
+    this.cancel();
   }
 
   go() {
@@ -41,7 +52,7 @@ export class Engine {
     this.worker.postMessage({ number: this.number, request: this.current.request });
   }
 
-  /** Drops what is under way. */
+  /** Drops what is under way, and begins with what waits. */
   cancel() {
     if (!this.current) return;
     this.worker.terminate();

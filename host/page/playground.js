@@ -30,6 +30,11 @@ class Playground {
     this.edits = [];
     /** Answers shown, for tests. */
     this.shown = 0;
+    /** Requests, and the latest of which an answer is shown. */
+    this.asked = 0;
+    this.answered = 0;
+    /** Programs and machines from elsewhere. */
+    this.taken = 0;
     this.engine = new Engine(module, (stage, part) => this.tell(stage, part));
     this.sliders = new Sliders(element("sliders"), (edits) => {
       this.edits = [...this.edits, ...edits];
@@ -45,7 +50,11 @@ class Playground {
     }
     for (const text of Object.values(texts)) {
       text.addEventListener("input", () => {
-        this.base = texts.machine.value;
+        if (text === texts.machine) {
+          // What is typed is the machine; no slider writes over it.
+          this.base = text.value;
+          this.edits = [];
+        }
         clearTimeout(this.typed);
         this.typed = setTimeout(() => this.ask(), TYPED_MS);
       });
@@ -57,7 +66,8 @@ class Playground {
       this.ask();
     });
     element("cancel").addEventListener("click", () => {
-      this.engine.cancel();
+      clearTimeout(this.typed);
+      this.engine.drop();
       this.say("Cancelled. What is shown is the result before.", "unfinished");
     });
     element("open").addEventListener("click", () => element("file").click());
@@ -86,7 +96,9 @@ class Playground {
     });
   }
 
-  turnTo(sheet) {
+  /** Shows a sheet, and what it says, unless that is `asked` for already. */
+  turnTo(sheet, asked = false) {
+    clearTimeout(this.typed);
     const isText = (of) => of in texts;
     const isNew = !(isText(sheet) && isText(this.sheet)) && sheet !== this.sheet;
     this.sheet = sheet;
@@ -97,7 +109,7 @@ class Playground {
     element("save").hidden = !isText(sheet);
     element("sliders").hidden = sheet === "ramp";
     // An experiment is made when it is asked for.
-    if (isNew && sheet !== "drive") this.ask();
+    if (isNew && !asked && sheet !== "drive") this.ask();
   }
 
   async open(file) {
@@ -113,7 +125,8 @@ class Playground {
       this.base = text;
       this.edits = [];
     }
-    this.turnTo(of);
+    this.taken += 1;
+    this.turnTo(of, true);
     this.ask();
   }
 
@@ -134,7 +147,7 @@ class Playground {
     const machine = { machine_name: this.names.machine, machine: this.base, edits: this.edits };
     if (this.sheet === "drive") {
       const { experiment, axis } = Object.fromEntries(new FormData(element("drive")));
-      return { do: "drive", experiment, axis: Number(axis), ...machine };
+      return { do: "drive", experiment, axis: Number(axis ?? 0), ...machine };
     }
     return { do: "run", name: this.names.program, program: texts.program.value, ...machine };
   }
@@ -142,8 +155,16 @@ class Playground {
   /** Asks for what the sheets say, and shows the answer. */
   async ask() {
     clearTimeout(this.typed);
-    this.since = performance.now();
+    const since = performance.now();
+    this.since = since;
     const request = this.request();
+    if (request.do === "ramp" && !element("ramp").checkValidity()) {
+      this.say("found a field without a number, expected one that is not below 0", "faulted");
+      return;
+    }
+    this.asked += 1;
+    const number = this.asked;
+    const name = `${request.do} ${this.taken}`;
     let answer;
     try {
       answer = await this.engine.ask(request);
@@ -154,14 +175,20 @@ class Playground {
     // A later request has taken its place.
     if (!answer) return;
     const { header, data } = answer;
+    const inflated = header.error || request.do === "drive" ? null : await inflateBytes(data);
+    // While it was inflated, a later one was shown.
+    if (number < this.answered) return;
+    this.answered = number;
     if (header.error) {
+      // The machine is what its sliders say, also where the program is refused.
+      if (header.machine !== undefined) this.takeMachine(request, header);
       this.say(header.error, "faulted");
       this.point(header.error);
       this.shown += 1;
       return;
     }
     const runs = [];
-    if (request.do !== "drive") runs.push({ data: new Data(await inflateBytes(data)), program: null });
+    if (inflated) runs.push({ data: new Data(inflated), program: null });
     if (request.do !== "ramp") this.takeMachine(request, header);
     if (request.do === "drive") {
       const { outcome, is_good: isGood } = header;
@@ -177,11 +204,11 @@ class Playground {
       headline.replaceChildren();
       element("ramp-figures").replaceChildren(rampFigures(header.figures));
     }
-    this.page = show(runs);
+    this.page = show(runs, name);
     this.digest = header.digest;
     this.say("", "");
     this.shown += 1;
-    this.took = performance.now() - this.since;
+    this.took = performance.now() - since;
   }
 
   /** The machine as it was run; edits that came since then are still to be made. */

@@ -126,8 +126,9 @@ export class Sliders {
     for (const { slider, input, output } of this.inputs) {
       const values = this.values(slider);
       if (values.length === 0) continue;
-      // What the reader moves stays where it is moved to.
-      if (!input.matches(":active")) input.value = Math.round(STEPS * partOf(slider, values[0]));
+      // What the reader moves stays where it is moved to, by a key too: several places of a slider have one value.
+      const isThere = input.matches(":active") || valueAt(slider, input.valueAsNumber / STEPS) === values[0];
+      if (!isThere) input.value = Math.round(STEPS * partOf(slider, values[0]));
       this.tell(slider, output, values);
     }
   }

@@ -15,13 +15,17 @@ import { work } from "page/work.js";
 const empty = document.getElementById("workbench").cloneNode(true);
 /** What it shows. */
 let page = null;
-/** What the reader chose of it. */
-let kept = null;
+/** What it is, and what the reader chose of each. */
+let shown = "";
+const choices = new Map();
 
-/** Shows a source's runs in place of those before; what the reader chose of them stays. Null if there is nothing to show. */
-export function show(given) {
+/** Shows a source's runs in place of those before; what the reader chose of runs of this name stays. Null if there is nothing to
+ * show. */
+export function show(given, name = "") {
   let runs = given.map(({ data, program }) => new Run(data, program));
   clear();
+  shown = name;
+  const kept = choices.get(name);
   if (runs.length === 0 || runs[0].ticks === 0) return null;
   for (const { header } of runs.slice(1).filter((run) => run.ticks === 0)) {
     complain(`${header.program} is not shown: it holds no tick.`);
@@ -51,7 +55,7 @@ export function show(given) {
 /** Shows nothing. */
 function clear() {
   if (!page) return;
-  kept = { state: page.state.kept(), path: page.path.kept(), tables: page.tables.kept() };
+  choices.set(shown, { state: page.state.kept(), path: page.path.kept(), tables: page.tables.kept() });
   page.state.end();
   page = null;
   document.getElementById("workbench").replaceWith(empty.cloneNode(true));

@@ -22,8 +22,9 @@ type Number = f32;
 const STEPS: usize = 200;
 const TICKS: usize = 20_000;
 
-/// What the ticks of a run may take: a module has 4 GiB at most \[bytes\].
-const TICKS_BYTES_MAX: usize = 3 << 30;
+/// What the ticks of a run may take \[bytes\]: a list of a module has 2 GiB at most, and one that is longer than was planned, by
+/// program stops, doubles.
+const TICKS_BYTES_MAX: usize = 900 << 20;
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -58,13 +59,52 @@ pub(super) fn begin(request: RunRequest) -> Result<Box<dyn Work>, String> {
     let RunRequest { name, program: text, machine_name, machine, edits } = request;
     let machine_text = with_numbers(&machine_name, &machine, &edits).map_err(|error| error.to_string())?;
     let machine = AnyMachine::from_toml(&machine_name, &machine_text).map_err(|error| error.to_string())?;
-    let program = gcode::read_with(&name, text.as_bytes(), &machine.read_options());
-    let program = program.map_err(|error| error.to_string())?;
+    let axes = match &machine {
+        AnyMachine::Three(machine) => names(machine),
+        AnyMachine::Nine(machine) => names(machine),
+    };
+    let program = match gcode::read_with(&name, text.as_bytes(), &machine.read_options()) {
+        Ok(program) => program,
+        Err(error) => return Ok(Box::new(Refusing(RefusedJson::new(&error, machine_text, axes)))),
+    };
     let request = Read { name, text, program: Box::leak(Box::new(program)), machine_text };
     Ok(match machine {
         AnyMachine::Three(machine) => Box::new(Running::new(request, Box::leak(machine))),
         AnyMachine::Nine(machine) => Box::new(Running::new(request, Box::leak(machine))),
     })
+}
+
+/// Names of the axes that there are.
+fn names<const N: usize>(machine: &Machine<N>) -> Vec<String> {
+    machine.driven_axes().iter().map(|axis| axis.name.clone()).collect()
+}
+
+/// A program that is refused, and the machine, which is not.
+#[derive(Serialize)]
+struct RefusedJson {
+    error: String,
+    machine: String,
+    sliders: Vec<SliderJson>,
+    axes: Vec<String>,
+}
+
+impl RefusedJson {
+    fn new(error: &impl ToString, machine: String, axes: Vec<String>) -> Self {
+        Self { error: error.to_string(), sliders: sliders::of_machine(&machine), machine, axes }
+    }
+}
+
+/// The answer is there already.
+struct Refusing(RefusedJson);
+
+impl Work for Refusing {
+    fn advance(&mut self) -> Result<Option<Answer>, String> {
+        Answer::new(&self.0, Vec::new()).map(Some)
+    }
+
+    fn progress(&self) -> Progress {
+        Progress { stage: Stage::Reading, part: 1.0 }
+    }
 }
 
 /// What was read.
@@ -149,8 +189,9 @@ impl<const N: usize> Running<N> {
     }
 }
 
-impl<const N: usize> Work for Running<N> {
-    fn advance(&mut self) -> Result<Option<Answer>, String> {
+impl<const N: usize> Running<N> {
+    /// Does a part of it.
+    fn step(&mut self) -> Result<Option<Answer>, String> {
         let all = &self.read.program.steps;
         match std::mem::replace(&mut self.phase, Phase::Over) {
             Phase::Planning(mut planner, done) if done < all.len() => {
@@ -178,6 +219,16 @@ impl<const N: usize> Work for Running<N> {
             Phase::Over => return Err("found a request that was answered, expected another one".to_owned()),
         }
         Ok(None)
+    }
+}
+
+impl<const N: usize> Work for Running<N> {
+    fn advance(&mut self) -> Result<Option<Answer>, String> {
+        self.step().or_else(|error| {
+            // The machine is as it was asked for, whatever becomes of the program.
+            let refused = RefusedJson::new(&error, self.read.machine_text.clone(), names(self.machine));
+            Answer::new(&refused, Vec::new()).map(Some)
+        })
     }
 
     fn progress(&self) -> Progress {

@@ -82,6 +82,18 @@ fn refusals_name_file_line_and_what_was_found() {
     assert_eq!(no_table, "m.toml:1:1: found no table [paths], expected it for x");
     let far = error(&run_of("G21 G90 F1\nG1 X10000 F1\nG1 X0\nM2\n", &json!([])));
     assert!(far.starts_with("part.ngc: found 1200") && far.contains("no memory for more ticks"), "{far}");
+    // An hour of motion is too long, also where it is not absurd.
+    let hour = error(&run_of("G21 G90\nG1 X6000 F100\nM2\n", &json!([])));
+    assert!(hour.starts_with("part.ngc: found 3600 s of motion, expected 19"), "{hour}");
+    // The sliders' machine comes with a program that is refused.
+    let edit = json!([{"table": "path", "key": "jerk_mm_s3", "value": 9000.0}]);
+    for text in ["G1 Q\n", "G21 G90\nG1 X6000 F100\nM2\n"] {
+        let (refused, _) = answered(&run_of(text, &edit));
+        let machine = refused["machine"].as_str().expect("a file");
+        assert!(refused["error"].is_string() && machine.contains("jerk_mm_s3 = 9000"), "{machine}");
+        assert_eq!(refused["axes"], json!(["X", "Y", "Z"]));
+        assert!(refused["sliders"].as_array().is_some_and(|sliders| sliders.len() > 10));
+    }
     let unknown = error(&json!({"do": "sing"}));
     assert!(unknown.starts_with("request: found unknown variant"), "{unknown}");
 }
