@@ -454,8 +454,9 @@ pub(crate) fn axes_are_tuned() {
     assert_eq!(circles.len(), 12);
     for (index, circle) in circles.iter().enumerate() {
         let (table, row) = (3 + index / 6, index % 6);
-        told.assert_at([table, row, 1], &circle["before"]["contour_error_um"]);
-        told.assert_at([table, row, 2], &circle["after"]["contour_error_um"]);
+        told.assert_at([table, row, 1], &circle["feed_mm_min"]);
+        told.assert_at([table, row, 2], &circle["before"]["contour_error_um"]);
+        told.assert_at([table, row, 3], &circle["after"]["contour_error_um"]);
     }
     // What the page takes is the file that the command writes.
     page.after("document.querySelector('.take').click()");
