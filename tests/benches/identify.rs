@@ -1,6 +1,6 @@
 //! Identification of random drives against what they are: `cargo bench -p motion-tests --bench identify -- 0 1000`.
 //!
-//! The arguments are the first seed and the one after the last. It prints the tables of `tests/expected/drives.md`.
+//! The arguments are the first seed and the one after the last. It prints the tables of `docs/DRIVES.md`.
 
 use motion_tests::drives::{report, surveyed};
 

@@ -354,7 +354,7 @@ fn recordings_of_no_servo_axis_are_refused() {
 }
 
 /// Ten drives of which everything varies. `cargo bench -p motion-tests --bench identify -- 0 1000` surveys as many as
-/// one likes; `tests/expected/drives.md` is what it said.
+/// one likes; `docs/DRIVES.md` is what it said.
 #[test]
 fn ten_random_drives_are_found() {
     for seed in 0..10 {
