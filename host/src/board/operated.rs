@@ -185,7 +185,7 @@ impl<R: Root + Send, const N: usize, const M: usize> Operated<R, N, M> {
             axes: axes.collect(),
         };
         Ok(Self {
-            axes: info.axes.iter().map(|axis| axis.name.clone()).collect(),
+            axes: machine.axis_names(),
             machine: Arc::new(machine.clone()),
             info,
             nothing,
@@ -311,7 +311,6 @@ impl<R: Root + Send, const N: usize, const M: usize> Board for Operated<R, N, M>
         let (mut heard, mut events) = (Vec::new(), Vec::new());
         self.connection.step(wait, &mut |one| heard.push(one));
         for one in heard {
-            // That somebody else has the board is told by itself.
             if let Some(work) = &mut self.work
                 && let Err(error) = work.sender().hear(&one)
             {

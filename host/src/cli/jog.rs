@@ -186,7 +186,7 @@ impl<const N: usize> OnBoard for OnKeys<'_, N> {
     fn run<R: Root + Send, const M: usize>(self, mut connection: Connection<M>) -> Result<Outcome, CliError> {
         let Self { machine, arguments, port, keys, dead_man_ms, out } = self;
         let job = Arc::new(Job::<M>::new(machine, &[]));
-        let axes = machine.driven_axes().iter().map(|axis| axis.name.clone()).collect();
+        let axes = machine.axis_names();
         let found = if arguments.restart { Found::GivenUp } else { Found::Stays };
         let may = Permissions { enables: arguments.enable, found, ..Permissions::default() };
         let jogs = Jogs { keys, job, axes, may, dead_man_ms };

@@ -290,6 +290,12 @@ impl<const N: usize> Machine<N> {
         &self.axes[..self.axis_count()]
     }
 
+    /// Their names.
+    #[must_use]
+    pub fn axis_names<C: FromIterator<String>>(&self) -> C {
+        self.driven_axes().iter().map(|axis| axis.name.clone()).collect()
+    }
+
     /// Their letters.
     #[must_use]
     pub fn letters(&self) -> Axes {

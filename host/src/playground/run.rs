@@ -60,8 +60,8 @@ pub(super) fn begin(request: RunRequest) -> Result<Box<dyn Work>, String> {
     let machine_text = with_numbers(&machine_name, &machine, &edits).map_err(|error| error.to_string())?;
     let machine = AnyMachine::from_toml(&machine_name, &machine_text).map_err(|error| error.to_string())?;
     let axes = match &machine {
-        AnyMachine::Three(machine) => names(machine),
-        AnyMachine::Nine(machine) => names(machine),
+        AnyMachine::Three(machine) => machine.axis_names(),
+        AnyMachine::Nine(machine) => machine.axis_names(),
     };
     let program = match gcode::read_with(&name, text.as_bytes(), &machine.read_options()) {
         Ok(program) => program,
@@ -72,11 +72,6 @@ pub(super) fn begin(request: RunRequest) -> Result<Box<dyn Work>, String> {
         AnyMachine::Three(machine) => Box::new(Running::new(request, Box::leak(machine))),
         AnyMachine::Nine(machine) => Box::new(Running::new(request, Box::leak(machine))),
     })
-}
-
-/// Names of the axes that there are.
-fn names<const N: usize>(machine: &Machine<N>) -> Vec<String> {
-    machine.driven_axes().iter().map(|axis| axis.name.clone()).collect()
 }
 
 /// A program that is refused, and the machine, which is not.
@@ -226,7 +221,7 @@ impl<const N: usize> Work for Running<N> {
     fn advance(&mut self) -> Result<Option<Answer>, String> {
         self.step().or_else(|error| {
             // The machine is as it was asked for, whatever becomes of the program.
-            let refused = RefusedJson::new(&error, self.read.machine_text.clone(), names(self.machine));
+            let refused = RefusedJson::new(&error, self.read.machine_text.clone(), self.machine.axis_names());
             Answer::new(&refused, Vec::new()).map(Some)
         })
     }

@@ -422,7 +422,7 @@ fn drive_to_end<const N: usize, const M: usize>(
         BoardError::Program(error) => CliError::Program(error),
         error => arguments.port.refused(error),
     };
-    let names: Arc<[String]> = machine.driven_axes().iter().map(|axis| axis.name.clone()).collect();
+    let names: Arc<[String]> = machine.axis_names();
     let Driven { job, planned, found, stops, middle, mut journal, lines } = driven;
     let may = arguments.drives.permissions(found);
     let items = planned.is_none().then_some(job.items.len());
