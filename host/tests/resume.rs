@@ -25,7 +25,7 @@ use motion_kernel::hal::{
 };
 use motion_kernel::kernel::Kernel;
 use motion_kernel::law::PathMotion;
-use motion_kernel::link::{BoardLink, Event, FRAME_MAX, Identity, PROTOCOL};
+use motion_kernel::link::{BoardLink, Build, Event, FRAME_MAX, Identity};
 use motion_kernel::live::Leads;
 use motion_kernel::path::Piece;
 use motion_kernel::program::{FORMAT, Item};
@@ -142,7 +142,7 @@ fn run(
     let started = motion_board::Machine::<f32, 3>::new(&record, &board).expect("suits");
     let header = *started.header();
     let identity = Identity {
-        protocol: PROTOCOL,
+        build: Build::THIS,
         format: FORMAT.into(),
         axes: 3,
         is_fixed_point: false,

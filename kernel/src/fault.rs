@@ -38,6 +38,8 @@
 //! ```
 
 pub(crate) mod reaction;
+#[cfg(feature = "link")]
+mod schema;
 
 use serde::{Deserialize, Serialize};
 
@@ -48,6 +50,7 @@ pub use reaction::{Reaction, Reactions};
 /// What went wrong, and when.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "link", derive(postcard_schema::Schema))]
 pub struct Fault<R> {
     /// The tick in which it was found.
     pub tick: u64,

@@ -113,6 +113,12 @@ impl<'de> Deserialize<'de> for Position {
     }
 }
 
+/// As those steps.
+#[cfg(feature = "link")]
+impl postcard_schema::Schema for Position {
+    const SCHEMA: &'static postcard_schema::schema::NamedType = i64::SCHEMA;
+}
+
 impl core::ops::Add for Position {
     type Output = Self;
     fn add(self, other: Self) -> Self {

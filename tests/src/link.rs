@@ -1,13 +1,13 @@
 //! What boards on the link say of themselves, for tests that need one.
 
 use motion_kernel::hal::BoardOutputs;
-use motion_kernel::link::{Identity, PROTOCOL, State, Status};
+use motion_kernel::link::{Build, Identity, State, Status};
 use motion_kernel::program::FORMAT;
 use motion_kernel::units::Position;
 
 /// Of a board with three axes, in f32, without outputs. Its room for items is the test's.
 pub const IDENTITY: Identity = Identity {
-    protocol: PROTOCOL,
+    build: Build::THIS,
     format: FORMAT as u16,
     axes: 3,
     is_fixed_point: false,

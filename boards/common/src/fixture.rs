@@ -5,7 +5,7 @@ use core::convert::Infallible;
 use motion_kernel::hal::{
     BoardOutputs, DriveEnable, Encoder, Inputs, MachineInputs, OutputState, Outputs, VelocityChannel,
 };
-use motion_kernel::link::{Identity, PROTOCOL};
+use motion_kernel::link::{Build, Identity};
 use motion_kernel::live::Leads;
 use motion_kernel::program::FORMAT;
 use motion_kernel::units::{Counts, DacCode, Position};
@@ -39,7 +39,7 @@ pub(crate) fn machine() -> Machine<'static> {
 /// Of a board on the link, with room for so many items.
 pub(crate) fn identity(items: usize) -> Identity {
     Identity {
-        protocol: PROTOCOL,
+        build: Build::THIS,
         format: FORMAT.into(),
         axes: AXES as u16,
         is_fixed_point: false,

@@ -3,7 +3,7 @@
 use std::io;
 use std::time::{Duration, Instant};
 
-use motion_kernel::link::{Controls, Event, FRAME_MAX, HostLink, Identity, Mode, PushError, Status};
+use motion_kernel::link::{Build, Controls, Event, FRAME_MAX, HostLink, Identity, Mode, PushError, Status};
 use motion_kernel::program::Item;
 
 use super::error::BoardError;
@@ -52,6 +52,8 @@ pub struct Connection<const N: usize> {
     stepped: Instant,
     is_lost: bool,
     identity: Option<Identity>,
+    /// What answered is of another build.
+    foreign: Option<Build>,
     status: Option<Status<N>>,
     scope: Option<Scope<N>>,
     /// When it was asked for a snapshot last.
@@ -76,6 +78,7 @@ impl<const N: usize> Connection<N> {
             stepped: now,
             is_lost: false,
             identity: None,
+            foreign: None,
             status: None,
             scope: None,
             looked: now,
@@ -107,6 +110,9 @@ impl<const N: usize> Connection<N> {
             });
             if let Some(cause) = lost.take() {
                 return Err(BoardError::Wire(io::Error::other(cause)));
+            }
+            if let Some(build) = self.foreign.take() {
+                return Err(BoardError::foreign(&build));
             }
         }
         Ok(())
@@ -160,7 +166,8 @@ impl<const N: usize> Connection<N> {
             self.heard = Instant::now();
             return Err(io::Error::other("no answer"));
         }
-        let (status, identity, mut has_come) = (&mut self.status, &mut self.identity, false);
+        let Self { status, identity, foreign, .. } = self;
+        let mut has_come = false;
         let scope = &self.scope;
         let mut events = Vec::new();
         self.link.receive(&bytes[..count], now_ms, &mut |event| {
@@ -174,6 +181,7 @@ impl<const N: usize> Connection<N> {
                 }
                 Event::Status(told) => *status = Some(told),
                 Event::Welcome(told) | Event::Refused(told) => *identity = Some(told),
+                Event::Foreign(build) => *foreign = Some(build),
                 Event::Restarted { .. } => {
                     *status = None;
                     if let Some(scope) = scope {

@@ -3,7 +3,7 @@
 use std::io;
 
 use motion_kernel::hal::BoardOutputs;
-use motion_kernel::link::{Identity, PROTOCOL, PushError, WriteError};
+use motion_kernel::link::{Build, Identity, PushError, WriteError};
 use motion_kernel::program::ProgramError;
 use thiserror::Error;
 
@@ -15,8 +15,8 @@ use crate::simulate::jog::JogError;
 /// What a board and a program have to agree on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Agreement {
-    /// The version of the link's protocol.
-    Protocol,
+    /// The version of the link's protocol, and the form of its messages.
+    Build,
     /// The version of the format of items.
     Format,
     /// The number of axes.
@@ -184,19 +184,22 @@ pub enum BoardError {
 }
 
 impl BoardError {
-    /// Whether a board has this protocol and `axes` axes, which the link needs before anything else.
+    /// The board is of a build whose messages this one does not read.
+    #[must_use]
+    pub fn foreign(build: &Build) -> Self {
+        Self::Disagrees { what: Agreement::Build, found: in_words(build), expected: in_words(&Build::THIS) }
+    }
+
+    /// Whether a board has `axes` axes, which the link needs before anything else.
     ///
     /// # Errors
-    /// In what it differs.
+    /// It has others.
     pub fn unless_linked(identity: &Identity, axes: usize) -> Result<(), Self> {
-        let (what, found, expected) = if identity.protocol != PROTOCOL {
-            (Agreement::Protocol, identity.protocol.to_string(), PROTOCOL.to_string())
-        } else if usize::from(identity.axes) != axes {
-            (Agreement::Axes, identity.axes.to_string(), axes.to_string())
-        } else {
+        if usize::from(identity.axes) == axes {
             return Ok(());
-        };
-        Err(Self::Disagrees { what, found, expected })
+        }
+        let (found, expected) = (identity.axes.to_string(), axes.to_string());
+        Err(Self::Disagrees { what: Agreement::Axes, found, expected })
     }
 
     /// Whether the user's input is wrong, and not what the board or the wire did.
@@ -238,9 +241,16 @@ impl BoardError {
     }
 }
 
+/// What a build is, as far as the other end has to know it.
+#[must_use]
+pub fn in_words(build: &Build) -> String {
+    let &Build { protocol, schema, kernel: [major, minor, patch] } = build;
+    format!("kernel {major}.{minor}.{patch}, whose link is protocol {protocol} with messages {schema:08x}")
+}
+
 fn shown(what: Agreement, value: &str) -> String {
     match what {
-        Agreement::Protocol => format!("protocol {value}"),
+        Agreement::Build => value.to_owned(),
         Agreement::Format => format!("format {value} of items"),
         Agreement::Axes => format!("{value} axes"),
         Agreement::Tick => format!("a tick of {value} s"),

@@ -51,7 +51,7 @@ pub fn open<const N: usize>(
         let connection = Connection::<N>::open(open, unique())?;
         return Ok(Box::new(Operated::<f32, N, N>::new(machine, port, connection, Some(board))?));
     }
-    on_axis_count!(machine.axis_count(), M => {
+    on_axis_count!(machine.axis_count(), in N, M => {
         let from = port.clone();
         let open = Box::new(move || from.open(baud));
         let mut connection = Connection::<M>::open(open, unique())?;

@@ -159,6 +159,7 @@ fn until<const M: usize, T>(
         connection.step(Duration::from_millis(10), &mut |one| heard.push(one));
         for one in heard {
             match one {
+                Heard::Board(Event::Foreign(build)) => return Err(BoardError::foreign(&build)),
                 Heard::Board(Event::Refused(identity)) => {
                     BoardError::unless_linked(&identity, M)?;
                 }

@@ -10,7 +10,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 
 use motion_kernel::axis::{AxesConfig, AxesError};
-use motion_kernel::link::{Identity, Piece};
+use motion_kernel::link::{Build, Identity, Piece};
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::program::{Header, Item, ProgramError, Reader};
 use motion_kernel::queue::LiveStreams;
@@ -63,6 +63,9 @@ impl ScopeSummary {
 /// Why there is no scope. Displays as "found …, expected …".
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ScopeError {
+    /// The board's ticks are another kernel's.
+    #[error("found a board with kernel {}, expected kernel {}, which runs its ticks again", version(*.0), version(Build::THIS.kernel))]
+    Kernel([u16; 3]),
     /// The board's parameters are none.
     #[error("found parameters that are none ({0:?}), expected those of a machine")]
     Parameters(ProgramError),
@@ -72,6 +75,10 @@ pub enum ScopeError {
     /// The board's number type does not hold them.
     #[error("found {0}, expected axes that the board's number type holds")]
     Axes(AxesError),
+}
+
+fn version([major, minor, patch]: [u16; 3]) -> String {
+    format!("{major}.{minor}.{patch}")
 }
 
 /// What the thread is told.
@@ -98,6 +105,9 @@ impl<const N: usize> Scope<N> {
     /// # Errors
     /// See [`ScopeError`].
     pub fn start(identity: &Identity, parameters: &[u8], sink: Sink<N>) -> Result<Self, ScopeError> {
+        if identity.build.kernel != Build::THIS.kernel {
+            return Err(ScopeError::Kernel(identity.build.kernel));
+        }
         if identity.is_fixed_point {
             Self::start_in::<Fixed>(parameters, sink)
         } else {

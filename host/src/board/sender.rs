@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use motion_kernel::hal::{BoardOutputs, Spindle};
-use motion_kernel::link::{Event, Identity, Mode, PROTOCOL, State, Status};
+use motion_kernel::link::{Event, Identity, Mode, State, Status};
 use motion_kernel::program::{FORMAT, Item};
 use motion_kernel::straight::Straight;
 
@@ -201,6 +201,7 @@ impl<const M: usize> Sender<M> {
         match *event {
             Event::Replaced => Err(BoardError::Replaced),
             Event::Welcome(identity) => check(&self.job, &identity),
+            Event::Foreign(build) => Err(BoardError::foreign(&build)),
             Event::Refused(identity) => check(&self.job, &identity).and(Err(BoardError::Silent)),
             Event::Restarted { confirmed } => {
                 let of_program =
@@ -496,7 +497,6 @@ impl<const M: usize> Sender<M> {
 /// In what it is not.
 pub fn check<const M: usize>(job: &Job<M>, identity: &Identity) -> Result<(), BoardError> {
     let pairs = [
-        (Agreement::Protocol, identity.protocol.to_string(), PROTOCOL.to_string()),
         (Agreement::Format, identity.format.to_string(), FORMAT.to_string()),
         (Agreement::Axes, identity.axes.to_string(), M.to_string()),
         (Agreement::Tick, identity.tick_s.to_string(), job.header.tick_s.to_string()),

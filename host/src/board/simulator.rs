@@ -17,7 +17,7 @@ use motion_kernel::fault::FaultKind;
 use motion_kernel::flight::FlightRecorder;
 use motion_kernel::hal::{BoardOutputs, Encoder, Inputs};
 use motion_kernel::kernel::Kernel;
-use motion_kernel::link::{BoardLink, FRAME_MAX, Identity, PROTOCOL};
+use motion_kernel::link::{BoardLink, Build, FRAME_MAX, Identity};
 use motion_kernel::live::Leads;
 use motion_kernel::program::FORMAT;
 use motion_kernel::queue::LiveStreams;
@@ -203,7 +203,7 @@ fn run_once<const N: usize>(
 ) -> Option<Vec<u8>> {
     let header = *machine.header();
     let identity = Identity {
-        protocol: PROTOCOL,
+        build: Build::THIS,
         format: FORMAT.into(),
         axes: N as u16,
         is_fixed_point: false,

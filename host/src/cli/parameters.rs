@@ -107,18 +107,11 @@ pub fn run(arguments: &ParametersArguments, out: &mut dyn Write) -> Result<Outco
         }
         What::Set { port, machine, disable } => {
             let machine = input::any_machine(Some(machine))?;
-            on_machine!(machine, machine => on_axis_count!(machine.axis_count(), M => {
-                set::<_, M>(port, machine, *disable, out)
-            }))
+            on_machine!(machine, machine => set(port, machine, *disable, out))
         }
         What::Diff { port, machine, json } => {
             let machine = input::any_machine(machine.machine.as_ref())?;
-            on_machine!(machine, machine => on_axis_count!(machine.axis_count(), M => {
-                let (_, board) = of_board::<M>(port)?;
-                let file = job::parameters::<_, M>(machine);
-                let file = Figures::of::<M>(&file).map_err(|error| port.refused(BoardError::NoParameters(error)))?;
-                print(&board.differences(&file), *json, out)
-            }))
+            on_machine!(machine, machine => compare(port, machine, *json, out))
         }
     }
 }
@@ -132,10 +125,7 @@ pub(super) fn identity(port: &PortArguments) -> Result<Identity, CliError> {
     let mut connection = port.open::<1>()?;
     connection.greet().map_err(|error| port.refused(error))?;
     match connection.identity() {
-        Some(identity) if (1..=9).contains(&identity.axes) => {
-            let linked = BoardError::unless_linked(identity, identity.axes.into());
-            linked.map(|()| *identity).map_err(|error| port.refused(error))
-        }
+        Some(identity) if (1..=9).contains(&identity.axes) => Ok(*identity),
         _ => Err(port.refused(BoardError::Silent)),
     }
 }
@@ -157,22 +147,37 @@ fn of_board<const M: usize>(port: &PortArguments) -> Result<(Vec<u8>, Figures), 
     Ok((record, figures))
 }
 
-fn set<const N: usize, const M: usize>(
+fn set<const N: usize>(
     port: &PortArguments,
     machine: &Machine<N>,
     disable: bool,
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
     identity(port)?;
-    let record = job::parameters::<N, M>(machine);
-    let mut connection = connected::<M>(port)?;
-    if disable {
-        self::disable(&mut connection).map_err(|error| port.refused(error))?;
-    }
-    let identity = write(&mut connection, &record).map_err(|error| port.refused(error))?;
+    let identity = on_axis_count!(machine.axis_count(), in N, M => {
+        let mut connection = connected::<M>(port)?;
+        if disable {
+            self::disable(&mut connection).map_err(|error| port.refused(error))?;
+        }
+        write(&mut connection, &job::parameters::<N, M>(machine)).map_err(|error| port.refused(error))?
+    });
     writeln!(out, "{} has machine {:?}, {:08x}", port.port, machine.name, identity.machine)
         .map_err(CliError::Output)?;
     Ok(Outcome::Done)
+}
+
+fn compare<const N: usize>(
+    port: &PortArguments,
+    machine: &Machine<N>,
+    json: bool,
+    out: &mut dyn Write,
+) -> Result<Outcome, CliError> {
+    on_axis_count!(machine.axis_count(), in N, M => {
+        let (_, board) = of_board::<M>(port)?;
+        let file = job::parameters::<N, M>(machine);
+        let file = Figures::of::<M>(&file).map_err(|error| port.refused(BoardError::NoParameters(error)))?;
+        print(&board.differences(&file), json, out)
+    })
 }
 
 fn print(differences: &[Difference], json: bool, out: &mut dyn Write) -> Result<Outcome, CliError> {

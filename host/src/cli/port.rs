@@ -102,7 +102,7 @@ impl PortArguments {
             connection.greet().map_err(|error| self.refused(error))?;
             return work.run::<f32, N>(connection);
         }
-        on_axis_count!(machine.axis_count(), M => {
+        on_axis_count!(machine.axis_count(), in N, M => {
             let mut connection = self.open::<M>()?;
             connection.greet().map_err(|error| self.refused(error))?;
             if connection.identity().is_some_and(|identity| identity.is_fixed_point) {

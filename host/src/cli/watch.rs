@@ -51,8 +51,9 @@ pub struct WatchArguments {
 /// There is no board, or it is lost.
 pub fn watch(arguments: &WatchArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
     let identity = identity(&arguments.port)?;
+    let [major, minor, patch] = identity.build.kernel;
     let header = format!(
-        "{} axes, {}, {} ticks/s, machine {:08x}",
+        "kernel {major}.{minor}.{patch}, {} axes, {}, {} ticks/s, machine {:08x}",
         identity.axes,
         if identity.is_fixed_point { "fixed point" } else { "f32" },
         (1.0 / identity.tick_s).round(),

@@ -9,19 +9,26 @@ use motion_kernel::program::{Header, Item, write};
 
 use crate::machine::Machine;
 
-/// Evaluates an expression with a count of axes as a constant.
+/// Evaluates an expression with a count of axes as a constant. Of a machine with `N` places, for the counts that have so many
+/// ([`AnyMachine`](crate::machine::AnyMachine)): others are not compiled.
 macro_rules! on_axis_count {
-    (@arm $count:expr, $name:ident => $result:expr; $($number:literal)*) => {
+    (@arms $count:expr, $name:ident => $result:expr; $($number:literal if $has_places:expr),*) => {
         match $count {
-            $($number => {
+            $($number if const { $has_places } => {
                 const $name: usize = $number;
                 $result
             })*
-            count => panic!("{count} axes, where machines have one to nine"),
+            count => panic!("{count} axes, where machines have one to nine, in the fewest places that hold them"),
         }
     };
+    ($count:expr, in $places:ident, $name:ident => $result:expr) => {
+        $crate::planning::on_axis_count!(@arms $count, $name => $result;
+            1 if $places == 3, 2 if $places == 3, 3 if $places == 3, 4 if $places == 9, 5 if $places == 9,
+            6 if $places == 9, 7 if $places == 9, 8 if $places == 9, 9 if $places == 9)
+    };
     ($count:expr, $name:ident => $result:expr) => {
-        $crate::planning::on_axis_count!(@arm $count, $name => $result; 1 2 3 4 5 6 7 8 9)
+        $crate::planning::on_axis_count!(@arms $count, $name => $result;
+            1 if true, 2 if true, 3 if true, 4 if true, 5 if true, 6 if true, 7 if true, 8 if true, 9 if true)
     };
 }
 
@@ -35,7 +42,7 @@ pub(super) fn bytes<'a, const N: usize>(
     machine: &Machine<N>,
     items: impl IntoIterator<Item = &'a Item<N>>,
 ) -> Vec<u8> {
-    on_axis_count!(machine.axis_count(), M => bytes_of::<N, M>(machine, items))
+    on_axis_count!(machine.axis_count(), in N, M => bytes_of::<N, M>(machine, items))
 }
 
 /// The bytes of `items` for the first `M` axes of `machine`, as many as it has.

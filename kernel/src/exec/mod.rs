@@ -66,6 +66,7 @@ pub enum ExecState {
 /// Why the executor can't continue. Latched by the kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "link", derive(postcard_schema::Schema))]
 pub enum ExecFault {
     /// The next feed segment was needed and had not arrived.
     FeedStarved,

@@ -53,6 +53,7 @@ impl OutputState {
 
 /// What a board has for spindle and coolant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "link", derive(postcard_schema::Schema))]
 pub enum BoardOutputs {
     /// Nothing: programs that switch are refused.
     None,

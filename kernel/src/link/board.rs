@@ -9,7 +9,7 @@ use core::task::Poll;
 use heapless::Deque;
 
 use super::frame::{Deframer, FRAME_MAX, Payload};
-use super::message::{Controls, Identity, Mode, Piece, Reply, Request, Status, Taken, WriteError};
+use super::message::{Controls, Identity, Mode, Piece, Reply, Request, Status, Taken, Welcome, WriteError};
 use super::parameters::ParameterBuffer;
 use crate::program::compact::Decoder;
 use crate::program::{Item, Source, take};
@@ -385,7 +385,10 @@ impl BoardLink {
         let reply = if core::mem::take(&mut self.is_welcome_due) {
             // What was said before may have been said to somebody else.
             self.is_taken_due = true;
-            Reply::Welcome { session, asker: self.asker, identity, controls: self.controls }
+            let reply = Reply::<1>::Welcome { session, asker: self.asker, build: identity.build };
+            return Payload::of(&reply)
+                .and_then(|payload| payload.then(&Welcome { identity, controls: self.controls }))
+                .map_or(0, |payload| payload.frame(out));
         } else {
             let taken = Taken {
                 session,

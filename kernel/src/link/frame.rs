@@ -27,6 +27,13 @@ impl Payload {
         Some(payload)
     }
 
+    /// With `message` behind it; `None` if it is too long.
+    pub(super) fn then<T: serde::Serialize>(mut self, message: &T) -> Option<Self> {
+        let room = self.bytes.get_mut(self.length..PAYLOAD_MAX)?;
+        self.length += postcard::to_slice(message, room).ok()?.len();
+        Some(self)
+    }
+
     /// Appends bytes; false if there is no room for all of them.
     pub(super) fn push_all(&mut self, bytes: impl Iterator<Item = u8>) -> bool {
         for byte in bytes {

@@ -7,7 +7,7 @@ use heapless::Deque;
 
 use super::frame::{Deframer, PAYLOAD_MAX, Payload};
 use super::message::{
-    Controls, Identity, Mode, PROTOCOL, Piece, Record, Reply, Request, Status, Taken, WriteError,
+    Build, Controls, Identity, Mode, Piece, Record, Reply, Request, Status, Taken, Welcome, WriteError,
 };
 use crate::program::compact::Encoder;
 use crate::program::{Checksum, Item, take};
@@ -32,7 +32,9 @@ const UNDER_WAY_MAX: usize = PAYLOAD_MAX;
 pub enum Event<const AXES: usize> {
     /// It is there.
     Welcome(Identity),
-    /// It is there, and is of another protocol or has another number of axes. Nothing is sent to it.
+    /// It is there, and speaks another protocol or has other messages. Nothing is sent to it.
+    Foreign(Build),
+    /// It is there, and has another number of axes. Nothing is sent to it.
     Refused(Identity),
     /// It takes items: those of [`Controls::program`], after a greeting, or of the program that was begun or none, after
     /// another one was given up.
@@ -429,10 +431,15 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
                     }
                 }
                 Reply::Parameters { .. } | Reply::Written { .. } | Reply::Scope { .. } => {}
-                _ if !rest.is_empty() => {}
-                Reply::Welcome { session, asker, identity, controls } => {
+                Reply::Welcome { session, asker, build } => {
+                    let welcome = if Build::THIS.understands(&build) { take::<Welcome>(rest) } else { None };
                     if asker == self.asker {
-                        self.greeted(session, &identity, &controls, on_event);
+                        if let Some((welcome, [])) = welcome {
+                            self.greeted(session, &welcome, on_event);
+                        } else if !Build::THIS.understands(&build) {
+                            self.not_greeted();
+                            on_event(Event::Foreign(build));
+                        }
                     } else if self.is_of(session) {
                         let is_own =
                             asker.wrapping_sub(self.first_asker) <= self.asker.wrapping_sub(self.first_asker);
@@ -447,6 +454,7 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
                         self.is_asking = true;
                     }
                 }
+                _ if !rest.is_empty() => {}
                 Reply::Taken(taken) => self.taken(&taken, now_ms, on_event),
                 Reply::Status { session, status } if self.is_of(session) => on_event(Event::Status(status)),
                 Reply::Status { .. } => {}
@@ -462,11 +470,15 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         }
     }
 
+    /// The board is none for this end. Asked again, as seldom as one that does not answer.
+    fn not_greeted(&mut self) {
+        (self.is_asking, self.session) = (false, Session::Unknown);
+    }
+
     fn greeted(
         &mut self,
         session: u32,
-        identity: &Identity,
-        controls: &Controls,
+        &Welcome { identity, controls }: &Welcome,
         on_event: &mut impl FnMut(Event<AXES>),
     ) {
         self.is_asking = false;
@@ -477,14 +489,13 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         if self.is_of(session) || [Session::Lost(session), Session::Replaced].contains(&self.session) {
             return;
         }
-        if identity.protocol != PROTOCOL || usize::from(identity.axes) != AXES {
-            // Asked again, as seldom as one that does not answer.
-            self.session = Session::Unknown;
-            return on_event(Event::Refused(*identity));
+        if usize::from(identity.axes) != AXES {
+            self.not_greeted();
+            return on_event(Event::Refused(identity));
         }
         // What was pressed before is no command for this board: only what is pressed from now on.
-        (self.controls, self.confirmed_controls) = (*controls, controls.number);
-        on_event(Event::Welcome(*identity));
+        (self.controls, self.confirmed_controls) = (controls, controls.number);
+        on_event(Event::Welcome(identity));
         if self.scope.is_some() {
             self.set_scope(true);
         }

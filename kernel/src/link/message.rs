@@ -1,16 +1,65 @@
 //! What the two ends say to each other.
 
+use postcard_schema::Schema;
+use postcard_schema::key::hash::fnv1a64::hash_ty_path;
 use serde::{Deserialize, Serialize};
 
 use crate::fault::Fault;
 use crate::hal::BoardOutputs;
 use crate::units::Position;
 
-/// The version of this protocol. A PC refuses a board of another version.
-pub const PROTOCOL: u16 = 6;
+/// The version of this protocol. Raised where a message means something else, in the same form or another one.
+const PROTOCOL: u16 = 7;
+
+/// What an end of the link is built from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub struct Build {
+    /// The version of its protocol. A PC refuses a board of another one.
+    pub protocol: u16,
+    /// A number that differs where any message has another form: FNV-1a over their description.
+    pub schema: u32,
+    /// The version of the kernel: major, minor, patch.
+    pub kernel: [u16; 3],
+}
+
+impl Build {
+    /// Of this end.
+    pub const THIS: Self = Self {
+        protocol: PROTOCOL,
+        schema: schema(),
+        kernel: [
+            decimal(env!("CARGO_PKG_VERSION_MAJOR")),
+            decimal(env!("CARGO_PKG_VERSION_MINOR")),
+            decimal(env!("CARGO_PKG_VERSION_PATCH")),
+        ],
+    };
+
+    /// Whether both ends read each other's messages.
+    #[must_use]
+    pub fn understands(&self, other: &Self) -> bool {
+        (self.protocol, self.schema) == (other.protocol, other.schema)
+    }
+}
+
+/// The first four bytes of the hash. Arrays are as long as there are axes; the greeting tells how many there are.
+const fn schema() -> u32 {
+    let [a, b, c, d, ..] = hash_ty_path::<(Request, Reply<1>, Welcome)>("motion-kernel/link");
+    u32::from_le_bytes([a, b, c, d])
+}
+
+/// The number that `digits` are.
+const fn decimal(digits: &str) -> u16 {
+    let mut rest = digits.as_bytes();
+    let mut number: u16 = 0;
+    while let [digit, after @ ..] = rest {
+        number = number.wrapping_mul(10).wrapping_add((*digit - b'0') as u16);
+        rest = after;
+    }
+    number
+}
 
 /// From the PC.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub(super) enum Request {
     /// Who is there? The answer has the same number.
     Hello { asker: u32 },
@@ -29,7 +78,7 @@ pub(super) enum Request {
 }
 
 /// Parameters on their way: how many bytes, their checksum, and which attempt it is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub(super) struct Record {
     pub(super) length: u32,
     pub(super) sum: u32,
@@ -65,7 +114,7 @@ impl Piece {
 }
 
 /// Why a board does not take parameters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum WriteError {
     /// The drives are on.
     DrivesOn,
@@ -82,10 +131,11 @@ pub enum WriteError {
 }
 
 /// From the board.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub(super) enum Reply<const AXES: usize> {
-    /// The answer to a hello, and to what is of another session; with the controls that are obeyed.
-    Welcome { session: u32, asker: u32, identity: Identity, controls: Controls },
+    /// The answer to a hello, and to what is of another session. [`Welcome`] follows, to the payload's end, in a form that only
+    /// an end with the same messages reads: this much any two ends understand.
+    Welcome { session: u32, asker: u32, build: Build },
     /// What has come.
     Taken(Taken),
     /// What the machine does.
@@ -99,8 +149,15 @@ pub(super) enum Reply<const AXES: usize> {
     Scope { session: u32, epoch: u32, number: u32 },
 }
 
+/// What follows on [`Reply::Welcome`]: what the board is, and the controls that are obeyed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub(super) struct Welcome {
+    pub(super) identity: Identity,
+    pub(super) controls: Controls,
+}
+
 /// What has come to the board.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
 pub(super) struct Taken {
     pub(super) session: u32,
     /// Who asked last: what was said to somebody before may still be in a wire.
@@ -123,7 +180,7 @@ pub(super) struct Taken {
 const OVERRIDE_PERMILLE_MAX: u16 = 2000;
 
 /// What the operator wants, as a whole.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Controls {
     /// Counts the changes; the newest controls replace all others.
     pub number: u32,
@@ -177,7 +234,7 @@ impl Controls {
 }
 
 /// Whether the program is to be driven.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Mode {
     /// Driven as items come.
     Run,
@@ -186,10 +243,10 @@ pub enum Mode {
 }
 
 /// What a board is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Identity {
-    /// Its [`PROTOCOL`].
-    pub protocol: u16,
+    /// What it is built from.
+    pub build: Build,
     /// Version of the format of items.
     pub format: u16,
     /// Number of axes.
@@ -207,7 +264,7 @@ pub struct Identity {
 }
 
 /// What the machine does.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Status<const AXES: usize> {
     /// The tick.
     pub tick: u32,
@@ -241,7 +298,7 @@ pub struct Status<const AXES: usize> {
 }
 
 /// A machine's state. Whether it is in a fault, [`Status::fault`] tells.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum State {
     /// The drives are off.
     Off,

@@ -312,6 +312,7 @@ impl Bench {
                 }
                 Event::Replaced => assert!(self.is_forged, "nobody else asks"),
                 Event::Unreadable { item } => assert!(self.is_forged, "item {item} can't be read"),
+                Event::Foreign(build) => assert!(self.is_forged, "{build:?}"),
                 Event::Refused(identity) => assert!(self.is_forged, "{identity:?}"),
                 Event::Welcome(_)
                 | Event::Status(_)

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use motion_host::board::Job;
 use motion_host::machine::Machine;
-use motion_kernel::link::{Event, FRAME_MAX, HostLink, Mode, PROTOCOL, State, Status};
+use motion_kernel::link::{Build, Event, FRAME_MAX, HostLink, Mode, State, Status};
 use motion_kernel::program::{FORMAT, Item, Reader};
 use motion_kernel::straight::Straight;
 use motion_kernel::units::Position;
@@ -70,8 +70,8 @@ impl Pc {
             Event::Status(status) => self.status = Some(status),
             Event::Ready { .. } => self.is_ready = true,
             Event::Welcome(it) => {
-                let is_known = (it.protocol, it.format, it.axes, it.tick_s, it.machine)
-                    == (PROTOCOL, FORMAT.into(), AXES as u16, 0.0005, machine);
+                let is_known = (it.build, it.format, it.axes, it.tick_s, it.machine)
+                    == (Build::THIS, FORMAT.into(), AXES as u16, 0.0005, machine);
                 if !is_known {
                     refused = Some(format!("{it:?}, expected the machine {machine}"));
                 }

@@ -8,7 +8,7 @@ use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use motion_kernel::link::{Event, FRAME_MAX, HostLink, Identity, Mode, PROTOCOL, State, Status};
+use motion_kernel::link::{Build, Event, FRAME_MAX, HostLink, Identity, Mode, State, Status};
 use motion_kernel::program::{FORMAT, Header, Item, Reader, write};
 use motion_kernel::straight::Straight;
 use motion_kernel::units::Position;
@@ -309,7 +309,7 @@ fn driven(tools: &Tools, board: Board) -> Result<String, String> {
 
     let mut pc = Pc::greet(&mut emulator, 1)?;
     let expected = Identity {
-        protocol: PROTOCOL,
+        build: Build::THIS,
         format: FORMAT.into(),
         axes: AXES as u16,
         is_fixed_point: board.number == "fixed",

@@ -7,7 +7,7 @@ use core::sync::atomic::Ordering;
 
 use motion_board::LogLine;
 use motion_kernel::law::Pulse;
-use motion_kernel::link::{BoardLink, Identity, PROTOCOL};
+use motion_kernel::link::{BoardLink, Build, Identity};
 use motion_kernel::program::FORMAT;
 use nucleo_f446re::design_parameters::{BOARD, LINK_ITEMS, TICK_HZ};
 use nucleo_f446re::machine::{AXES, Control, Feeder, Intake, Linked, Machine, Number, PROGRAM, Streams};
@@ -57,7 +57,7 @@ impl Background {
         let header = machine.header();
         let (feeder, intake) = streams.split(header.rules, header.start);
         let identity = Identity {
-            protocol: PROTOCOL,
+            build: Build::THIS,
             format: FORMAT.into(),
             axes: AXES as u16,
             is_fixed_point: false,

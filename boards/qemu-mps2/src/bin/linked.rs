@@ -30,7 +30,7 @@ use motion_board::{BoardOutputs, BoardParameters};
 use motion_kernel::flight::FlightRecorder;
 use motion_kernel::hal::Encoder;
 use motion_kernel::kernel::Kernel;
-use motion_kernel::link::{BoardLink, Identity, PROTOCOL};
+use motion_kernel::link::{BoardLink, Build, Identity};
 use motion_kernel::live::Leads;
 use motion_kernel::program::{FORMAT, ProgramError, Reader};
 use motion_kernel::scope::ScopeMemory;
@@ -180,7 +180,7 @@ fn timing(record: &'static [u8]) -> Result<(BoardParameters, u32, NonZeroU64), &
 /// What the board says about itself.
 fn identity(record: &[u8], machine: &Machine) -> Identity {
     Identity {
-        protocol: PROTOCOL,
+        build: Build::THIS,
         format: FORMAT.into(),
         axes: AXES as u16,
         is_fixed_point: IS_FIXED_POINT,
