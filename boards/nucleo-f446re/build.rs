@@ -2,7 +2,7 @@
 //!
 //! The program is `common/program/stringer.bin`, or what `MOTION_PROGRAM` names. The map is the repository's
 //! `memory.x`, copied to where the linker looks, so that there is one. The linker also refuses an image with more initial
-//! values than a few bytes.
+//! values than a few bytes, and one with the link that reaches the sectors of the parameters.
 
 use std::env;
 use std::error::Error;
@@ -11,6 +11,8 @@ use std::path::PathBuf;
 
 const PROGRAM: &str = "../common/program/stringer.bin";
 const MEMORY: &str = "../../memory.x";
+/// Where a board on the link keeps its parameters: `PARAMETER_SECTORS` of `design_parameters.rs`.
+const PARAMETERS: u32 = 0x0804_0000;
 /// Bytes of initial values that may be copied from flash at the start: the log's own. Whatever is big is initialised
 /// by code, or is all zeros.
 const DATA_MAX: u32 = 64;
@@ -32,7 +34,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     fs::copy(MEMORY, out.join("memory.x"))?;
     // The emulated board's model is no part of the firmware.
     let max = if env::var_os("CARGO_FEATURE_EMULATED").is_some() { DATA_MAX + 4096 } else { DATA_MAX };
-    let check = format!("ASSERT(SIZEOF(.data) <= {max}, \"a static's initial value is not all zeros\");\n");
+    let mut check =
+        format!("ASSERT(SIZEOF(.data) <= {max}, \"a static's initial value is not all zeros\");\n");
+    // What is emulated keeps them in memory.
+    if env::var_os("CARGO_FEATURE_LINK").is_some() && env::var_os("CARGO_FEATURE_EMULATED").is_none() {
+        check += &format!(
+            "ASSERT(LOADADDR(.data) + SIZEOF(.data) <= {PARAMETERS:#x}, \"the image reaches the sectors of the parameters\");\n"
+        );
+    }
     fs::write(out.join("data.x"), check)?;
     println!("cargo:rustc-link-search={}", out.display());
     // --nmagic: sections are not aligned to pages, which flash does not have.

@@ -11,7 +11,23 @@ use motion_kernel::program::{ProgramError, SupplyError};
 use motion_kernel::straight::StraightError;
 use motion_kernel::units::Position;
 
+use crate::machine::MachineError;
+use crate::stored::StoreError;
 use crate::tick_timing::TickTiming;
+
+/// Where a board's parameters are from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Origin {
+    /// From flash, which a PC had them written to.
+    Flash,
+    /// From the program that it was built with: flash has none.
+    Build,
+    /// From the program that it was built with: those in flash are not for this firmware.
+    Unsuitable(MachineError),
+    /// From the program that it was built with: flash can't be read or written.
+    NotStored(StoreError),
+}
 
 /// A line of the log.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,6 +36,8 @@ pub enum LogLine<R: Real, const AXES: usize> {
     Ready,
     /// The board waits for a PC on the link.
     Linked,
+    /// Where the board's parameters are from.
+    Parameters(Origin),
     /// A run starts from here.
     Started([Position; AXES]),
     /// There is no start: the emergency stop is open or a drive is not ready.
@@ -84,6 +102,14 @@ pub fn write<R: Real + defmt::Format, const AXES: usize>(line: &LogLine<R, AXES>
     match *line {
         LogLine::Ready => info!("ready: press the start button"),
         LogLine::Linked => info!("ready: waits for a PC on the link"),
+        LogLine::Parameters(Origin::Flash) => info!("parameters: from flash"),
+        LogLine::Parameters(Origin::Build) => info!("parameters: of the build"),
+        LogLine::Parameters(Origin::Unsuitable(error)) => {
+            warn!("parameters: of the build, as those in flash are not for this firmware: {}", error)
+        }
+        LogLine::Parameters(Origin::NotStored(error)) => {
+            error!("parameters: of the build, as flash keeps none: {}", error)
+        }
         LogLine::Started(from) => info!("started: from {=[?]} mm", from.map(Position::to_mm)),
         LogLine::NotReady => warn!("not started: the emergency stop is open or a drive is not ready"),
         LogLine::Done => info!("done: press the start button to run again"),

@@ -55,6 +55,8 @@ pub(crate) fn write_end(why: core::fmt::Arguments<'_>) {
 
 /// Everything the firmware uses, ready to tick.
 pub(crate) struct Board {
+    /// Of its machine, as a compiled program, whose items are driven if there is no link.
+    pub(crate) parameters: &'static [u8],
     pub(crate) hardware: Hardware,
     pub(crate) tick_timer: TickTimer,
     pub(crate) watchdog: IndependentWatchdog,
@@ -66,8 +68,23 @@ pub(crate) struct Board {
     pub(crate) line: Line,
 }
 
+/// The parameters; new ones are written to flash, which may take four seconds (DS10693, flash memory characteristics: erase of
+/// 128 KiB, byte by byte).
+#[cfg(feature = "link")]
+fn stored_parameters(mut flash: pac::FLASH) -> &'static [u8] {
+    use stm32f4xx_hal::flash::FlashExt;
+
+    // The data cache does not see an erase: it is off meanwhile, and empty afterwards (RM0390, section 3.4.2).
+    flash.acr().modify(|_, w| w.dcen().clear_bit());
+    let parameters = crate::stored::parameters(flash.unlocked());
+    flash.acr().modify(|_, w| w.dcrst().set_bit());
+    flash.acr().modify(|_, w| w.dcrst().clear_bit());
+    flash.acr().modify(|_, w| w.dcen().set_bit());
+    parameters
+}
+
 impl Board {
-    /// Sets the board up. Takes a few milliseconds; the tick's timer and the watchdog do not run yet.
+    /// Sets the board up. Takes a few milliseconds, or what new parameters take; the tick's timer and the watchdog do not run yet.
     pub(crate) fn new(device: pac::Peripherals, mut core: cortex_m::Peripherals) -> Self {
         let mut rcc = device.RCC.constrain();
         let gpioa = device.GPIOA.split(&mut rcc);
@@ -104,6 +121,10 @@ impl Board {
         info!("nucleo-f446re: {=u32} MHz, {=str}", SYSCLK_HZ / 1_000_000, cause);
         let lines = device.EXTI;
         supply::watch(&device.FLASH, &device.PWR, &lines, &mut rcc);
+        #[cfg(feature = "link")]
+        let parameters = stored_parameters(device.FLASH);
+        #[cfg(not(feature = "link"))]
+        let parameters = nucleo_f446re::machine::PROGRAM;
 
         let mut routing = device.SYSCFG.constrain(&mut rcc);
         let drives = Drives {
@@ -181,6 +202,7 @@ impl Board {
         watchdog.stop_on_debug(&device.DBGMCU, false);
 
         Self {
+            parameters,
             hardware: Hardware { encoders, outputs, drives, switches, spindle_and_coolant },
             tick_timer: TickTimer::new(device.TIM7, &mut rcc),
             watchdog,

@@ -188,6 +188,12 @@ pub const LINK_ERROR_BASIS_POINTS: i32 =
 /// Places for bytes that the DMA has brought: twice what may come between two looks of the background at them, a step of a
 /// plan.
 pub const LINK_RING: usize = 4096;
+/// Most bytes of parameters that the board keeps: three axes of the reference machine take some 600.
+pub const PARAMETERS_MAX: usize = 1024;
+/// Where it keeps them: sectors 6 and 7, 128 KiB each, which firmware with the link may not reach (RM0390, table 5) \[bytes from
+/// the begin of flash\]. The emulated board's are memory.
+pub const PARAMETER_SECTORS: core::ops::Range<u32> =
+    if cfg!(feature = "emulated") { 0..4096 } else { 0x4_0000..0x8_0000 };
 /// Items that have room before live control takes them: what comes while an answer is under way.
 pub const LINK_ITEMS: usize = 16;
 
@@ -199,8 +205,8 @@ const _: () = assert!(
 const _: () = assert!(TICK_HZ.is_multiple_of(1000), "the link counts whole milliseconds");
 
 /// Ticks that the flight recorder keeps: a twentieth of a second, 17 KB, what the stack leaves; with the link, which needs
-/// some of it, a twenty-second.
-pub const FLIGHT_ROWS: usize = TICK_HZ as usize / if cfg!(feature = "link") { 22 } else { 20 };
+/// some of it, a twenty-fifth.
+pub const FLIGHT_ROWS: usize = TICK_HZ as usize / if cfg!(feature = "link") { 25 } else { 20 };
 /// Ticks of these after the fault's: 25 ms, which show the axes coasting.
 pub const FLIGHT_AFTER: usize = TICK_HZ as usize / 40;
 

@@ -1,6 +1,6 @@
 //! The board's number of axes and memory sizes, for the types of `motion_board`.
 
-use crate::design_parameters::{FLIGHT_AFTER, FLIGHT_ROWS, LINK_ITEMS, PLACES};
+use crate::design_parameters::{FLIGHT_AFTER, FLIGHT_ROWS, LINK_ITEMS, PARAMETERS_MAX, PLACES};
 
 /// Number of axes: X, Y, Z.
 pub const AXES: usize = 3;
@@ -31,7 +31,7 @@ pub type Flight = motion_kernel::flight::FlightRecorder<Number, AXES, FLIGHT_ROW
 pub type Control = motion_board::Control<'static, Number, AXES, FLIGHT_ROWS, FLIGHT_AFTER>;
 
 /// The background of a board that a PC drives over the link.
-pub type Linked = motion_board::Linked<'static, Number, AXES, LINK_ITEMS, PLACES>;
+pub type Linked = motion_board::Linked<'static, Number, AXES, LINK_ITEMS, PLACES, PARAMETERS_MAX>;
 
 /// The background of a board on its own.
 pub type Background = motion_board::Background<'static, Number, AXES, 64, 16, PLACES>;

@@ -45,6 +45,8 @@ mod drives;
 mod switches;
 mod spindle;
 mod hal;
+#[cfg(feature = "link")]
+mod stored;
 #[cfg(not(feature = "link"))]
 mod console_port;
 mod background;
@@ -66,7 +68,7 @@ mod app {
     use motion_kernel::kernel::Kernel;
     use motion_kernel::tick_monitor::TickMonitor;
     use nucleo_f446re::design_parameters::{BOARD, TICK_CYCLES, TICK_PRIORITY};
-    use nucleo_f446re::machine::{Control, Flight, Machine, PROGRAM, Streams};
+    use nucleo_f446re::machine::{Control, Flight, Machine, Streams};
     use stm32f4xx_hal::watchdog::IndependentWatchdog;
 
     use crate::background::{Background, OfTick, Places, STEPS, TICKS};
@@ -101,18 +103,18 @@ mod app {
         places: Places = Places::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
-        let Board { mut hardware, mut tick_timer, mut watchdog, scope, button, line } =
+        let Board { parameters, mut hardware, mut tick_timer, mut watchdog, scope, button, line } =
             Board::new(cx.device, cx.core);
         let machine = defmt::unwrap!(if cfg!(feature = "link") {
-            Machine::without_items(PROGRAM, &BOARD)
+            Machine::without_items(parameters, &BOARD)
         } else {
-            Machine::new(PROGRAM, &BOARD)
+            Machine::new(parameters, &BOARD)
         });
         // The machine's position becomes the program's start.
         let kernel = Kernel::new(&machine.axes, machine.header().start, hardware.encoders.latch());
         let streams = cx.local.storage.write(Streams::new());
         let (background, intake, of_background) =
-            Background::new(cx.local.places, streams, machine, button, line);
+            Background::new(cx.local.places, streams, machine, parameters, button, line);
         let control = Control::new(kernel, intake, cx.local.flight.write(Flight::new()));
         Board::start(&mut tick_timer, &mut watchdog);
         let local = Local {

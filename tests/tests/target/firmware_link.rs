@@ -12,8 +12,9 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use motion_host::board::Job;
+use motion_host::board::job::parameters;
 use motion_host::machine::Machine;
-use motion_kernel::link::{Build, Event, FRAME_MAX, HostLink, Mode, State, Status};
+use motion_kernel::link::{Build, Event, FRAME_MAX, HostLink, Mode, State, Status, WriteError};
 use motion_kernel::program::{FORMAT, Item, Reader};
 use motion_kernel::straight::Straight;
 use motion_kernel::units::Position;
@@ -41,6 +42,11 @@ struct Pc {
     link: HostLink<AXES, 64, 8192>,
     status: Option<Status<AXES>>,
     is_ready: bool,
+    /// What has come of new parameters, until it is looked at.
+    written: Option<(u32, Option<WriteError>)>,
+    /// The board's parameters as far as they were read, and how many bytes there are.
+    read: (Vec<u8>, Option<u32>),
+    has_restarted: bool,
     items: VecDeque<Option<Item<AXES>>>,
 }
 
@@ -66,6 +72,7 @@ impl Pc {
             Err(error) => return Err(failed(error)),
         };
         let (mut refused, machine) = (None, self.machine);
+        let read = &mut self.read;
         self.link.receive(&bytes[..count], now_ms, &mut |event| match event {
             Event::Status(status) => self.status = Some(status),
             Event::Ready { .. } => self.is_ready = true,
@@ -76,6 +83,12 @@ impl Pc {
                     refused = Some(format!("{it:?}, expected the machine {machine}"));
                 }
             }
+            Event::Written { bytes, error } => self.written = Some((bytes, error)),
+            Event::Parameters { offset, length, piece } if offset as usize == read.0.len() => {
+                read.0.extend(piece.bytes());
+                read.1 = Some(length);
+            }
+            Event::Restarted { .. } => self.has_restarted = true,
             other => refused = Some(format!("{other:?}")),
         });
         refused.map_or(Ok(()), Err)
@@ -169,7 +182,42 @@ fn drive(pc: &mut Pc) -> Result<(), String> {
     }
     pc.start(aborted)?;
     let end = pc.driven()?;
-    check_end(&end)
+    check_end(&end)?;
+    take_parameters(pc)
+}
+
+/// The board takes new parameters, starts anew, and has them from its flash.
+fn take_parameters(pc: &mut Pc) -> Result<(), String> {
+    let mut machine = Machine::reference();
+    machine.axes[1].gains.kp_per_s = 200.0;
+    let record = parameters::<AXES, AXES>(&machine);
+    let sum = record.last_chunk().map_or(0, |sum| u32::from_le_bytes(*sum));
+    if std::mem::replace(&mut pc.machine, sum) == sum {
+        return Err("the parameters are those that the board has".to_owned());
+    }
+    if !pc.link.enable(false) {
+        return Err("no disable is taken".to_owned());
+    }
+    pc.until(|_, status| (status.state == State::Off).then_some(()))?;
+    pc.link.write_parameters(&record, 0);
+    while !pc.has_restarted {
+        pc.step()?;
+        match pc.written.take() {
+            Some((_, Some(error))) => return Err(format!("the parameters are not taken: {error:?}")),
+            Some((bytes, None)) => pc.link.write_parameters(&record, bytes),
+            None => {}
+        }
+    }
+    pc.link.accept();
+    pc.link.read_parameters(0);
+    while pc.read.1.is_none_or(|length| pc.read.0.len() < length as usize) {
+        let before = pc.read.0.len();
+        pc.step()?;
+        if pc.read.0.len() > before {
+            pc.link.read_parameters(pc.read.0.len() as u32);
+        }
+    }
+    if pc.read.0 == record { Ok(()) } else { Err("the board has other parameters than it took".to_owned()) }
 }
 
 /// Drives an emulated board with the image; what its log says.
@@ -194,7 +242,18 @@ fn run(image: &Path) -> Result<Vec<String>, String> {
     let driven = connect(&listener, &mut running).and_then(|stream| {
         let (begin, link) = (Instant::now(), HostLink::new(1));
         let machine = Job::<AXES>::new(&Machine::reference(), &[]).machine;
-        drive(&mut Pc { stream, begin, machine, link, status: None, is_ready: false, items: VecDeque::new() })
+        drive(&mut Pc {
+            stream,
+            begin,
+            machine,
+            link,
+            status: None,
+            is_ready: false,
+            written: None,
+            read: (Vec::new(), None),
+            has_restarted: false,
+            items: VecDeque::new(),
+        })
     });
     // It would run forever; a signal to `timeout` ends both.
     let ended = std::process::Command::new("kill").arg(running.id().to_string()).status();
@@ -239,5 +298,6 @@ pub(crate) fn a_pc_drives_the_firmware(tools: &Tools) -> Result<(), String> {
     if let Some(line) = lines.iter().find(|line| line.contains("Fault(") || line.contains("Refused(")) {
         return Err(format!("the log says {line:?}"));
     }
-    Ok(())
+    let origins: Vec<_> = lines.iter().filter_map(|line| line.split("Parameters(").nth(1)).collect();
+    if origins == ["Build)", "Flash)"] { Ok(()) } else { Err(format!("the parameters are from {origins:?}")) }
 }

@@ -83,6 +83,7 @@ impl Background {
         places: &'static mut Places,
         streams: &'static mut Streams,
         machine: Machine,
+        _: &'static [u8],
         button: ButtonPin,
         console: Line,
     ) -> (Self, Intake, OfTick) {

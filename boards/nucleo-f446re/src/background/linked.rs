@@ -5,16 +5,18 @@
 
 use core::sync::atomic::Ordering;
 
+use cortex_m::peripheral::SCB;
 use motion_board::LogLine;
 use motion_kernel::law::Pulse;
 use motion_kernel::link::{BoardLink, Build, Identity};
 use motion_kernel::program::FORMAT;
 use nucleo_f446re::design_parameters::{BOARD, LINK_ITEMS, TICK_HZ};
-use nucleo_f446re::machine::{AXES, Control, Feeder, Intake, Linked, Machine, Number, PROGRAM, Streams};
+use nucleo_f446re::machine::{AXES, Control, Feeder, Intake, Linked, Machine, Number, Streams};
 use rtic::Mutex;
 
 use super::{TICKS, count_step, wait_for_tick};
 use crate::board::{self, ButtonPin, Line};
+use crate::stored;
 use crate::tick_timer::cycles;
 
 /// Memory for both ends: none.
@@ -32,6 +34,7 @@ pub(crate) struct Background {
     feeder: Option<Feeder>,
     pulse: Pulse,
     identity: Identity,
+    parameters: &'static [u8],
     button: ButtonPin,
     port: Line,
 }
@@ -51,6 +54,7 @@ impl Background {
         _: &'static mut Places,
         streams: &'static mut Streams,
         machine: Machine,
+        parameters: &'static [u8],
         button: ButtonPin,
         port: Line,
     ) -> (Self, Intake, OfTick) {
@@ -66,12 +70,16 @@ impl Background {
             outputs: BOARD.outputs,
             machine: machine.program.machine_checksum(),
         };
-        (Self { feeder: Some(feeder), pulse: header.pulse, identity, button, port }, intake, OfTick)
+        (
+            Self { feeder: Some(feeder), pulse: header.pulse, identity, parameters, button, port },
+            intake,
+            OfTick,
+        )
     }
 
     /// Runs forever.
     pub(crate) fn run(&'static mut self, mut control: impl Mutex<T = Control>) -> ! {
-        let Self { feeder, pulse, identity, button, port } = self;
+        let Self { feeder, pulse, identity, parameters, button, port } = self;
         board::write(&LogLine::<Number, AXES>::Linked);
         while !port.has_come() {
             count_step();
@@ -80,7 +88,7 @@ impl Background {
         // Of two starts the memory, the unique identifier and the timers can all be the same. What differs is when the PC's
         // first byte comes, which its clock decides and not this one's: here in cycles of 6 ns since the start.
         let mut linked = begin(cycles(), identity, defmt::unwrap!(feeder.take()), *pulse);
-        linked.set_parameters(PROGRAM);
+        linked.set_parameters(parameters);
         let mut clock = Clock { ticks: 0, ms: 0 };
         loop {
             wait_for_tick();
@@ -98,6 +106,12 @@ impl Background {
                 linked.transmit(clock.ms_at(TICKS.load(Ordering::Relaxed)), &mut control, frame)
             });
             linked.note_poll(cycles().wrapping_sub(begin));
+            // The drives are off, and stay so.
+            match linked.new_parameters().map(stored::keep) {
+                Some(true) => SCB::sys_reset(),
+                Some(false) => linked.not_stored(),
+                None => {}
+            }
         }
     }
 }

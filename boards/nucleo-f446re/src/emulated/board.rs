@@ -74,6 +74,7 @@ impl DelayNs for Delay {
 
 /// Everything the firmware uses, ready to tick.
 pub(crate) struct Board {
+    pub(crate) parameters: &'static [u8],
     pub(crate) hardware: Hardware,
     pub(crate) tick_timer: TickTimer,
     pub(crate) watchdog: IndependentWatchdog,
@@ -86,6 +87,7 @@ impl Board {
     /// Sets the board up; the tick does not run yet.
     pub(crate) fn new(device: pac::Peripherals, core: cortex_m::Peripherals) -> Self {
         let tick_timer = TickTimer::new(core.SYST);
+        // The machine stays the one that the firmware was built with.
         let program = defmt::unwrap!(Reader::new(PROGRAM));
         model::start(program.header());
         let mut rcc = device.RCC.constrain();
@@ -149,6 +151,10 @@ impl Board {
         };
 
         Self {
+            #[cfg(feature = "link")]
+            parameters: crate::stored::parameters(super::flash::Flash),
+            #[cfg(not(feature = "link"))]
+            parameters: PROGRAM,
             hardware: Hardware { encoders: Encoders::new(), outputs, drives, switches, spindle_and_coolant },
             tick_timer,
             watchdog: IndependentWatchdog::new(device.IWDG),

@@ -25,6 +25,8 @@ pub(crate) mod encoders;
 #[cfg(feature = "link")]
 pub(crate) mod link_port;
 pub(crate) mod tick_timer;
+#[cfg(feature = "link")]
+mod flash;
 mod model;
 mod script;
 mod wires;
