@@ -137,6 +137,8 @@ fn result<const N: usize>(trace: &RunTrace<N>, summary: &Summary) -> String {
     let time = duration(summary.executed_time_s);
     match summary.outcome {
         Outcome::Empty => "<strong>Nothing was run:</strong> the trace holds no tick.".to_string(),
+        // Ticks alone: what a board did, without its plan.
+        Outcome::Done if trace.blocks.is_empty() => format!("<strong>Without a fault:</strong> {time}."),
         Outcome::Done => format!("<strong>Done without a fault:</strong> {blocks}, {length} mm in {time}."),
         Outcome::Unfinished => format!(
             "<strong>Not finished:</strong> {} at {} of {length} mm along the path{}, after {time}.",

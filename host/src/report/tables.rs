@@ -78,11 +78,12 @@ pub(super) fn key_figures<const N: usize>(trace: &RunTrace<N>, summary: &Summary
         ("Path length", path),
         (
             "Executed time",
-            format!(
-                "{}<small>planned {}</small>",
-                duration(summary.executed_time_s),
-                duration(trace.planned_time_s)
-            ),
+            if trace.blocks.is_empty() {
+                duration(summary.executed_time_s)
+            } else {
+                let planned = duration(trace.planned_time_s);
+                format!("{}<small>planned {planned}</small>", duration(summary.executed_time_s))
+            },
         ),
         ("Ticks", format!("{} of {} ms", count(trace.ticks.len() as u64), figure(trace.tick_s * 1e3, 4))),
         (
@@ -106,6 +107,10 @@ pub(super) fn key_figures<const N: usize>(trace: &RunTrace<N>, summary: &Summary
         let time_s = dwells().map(|rest| rest.to_s - rest.from_s).sum();
         let number = counted(dwells().count(), "dwell", "dwells");
         rows.push(("Dwells", format!("{}<small>{number}</small>", duration(time_s))));
+    }
+    if trace.blocks.is_empty() {
+        // There is no plan to tell of.
+        rows.retain(|(term, _)| !["Path length", "Blocks"].contains(term));
     }
     let mut list = String::from("<dl class=\"figures\">\n");
     for (term, value) in rows {

@@ -277,7 +277,7 @@ fn empty_and_one_tick_records_make_a_page() {
     one.ticks.truncate(1);
     assert!(page(&one).contains("Not finished"));
     one.blocks.clear();
-    assert!(page(&one).contains("Done without a fault"));
+    assert!(page(&one).contains("Without a fault"));
 }
 
 #[test]

@@ -321,6 +321,13 @@ fn every_tick_is_written() {
     let (status, out, _) = outcome(workspace.command(&watch).args(["state=idle", "--json"]));
     assert_eq!(status, Some(0), "{out}");
     assert!(workspace.read("rest.csv").lines().count() > 300);
+    // A page of the ticks around the trigger alone, without a trace.
+    let page = ["watch", "--port", port, "--seconds", "0.5", "--report", "rest.html", "--trigger"];
+    let (status, out, error) = outcome(workspace.command(&page).args(["state=idle", "--after", "20"]));
+    assert!(status == Some(0) && out.contains("report written to rest.html"), "{out} {error}");
+    assert!(workspace.read("rest.html").contains("only ticks around those with state=idle"));
+    let (status, _, error) = outcome(workspace.command(&page[..5]).args(["--trigger", "state=idle"]));
+    assert_eq!(status, Some(2), "{error}");
     let (status, _, error) = outcome(workspace.command(&watch).arg("X_speed>1"));
     assert_eq!(status, Some(2));
     assert!(error.contains("found `X_speed>1`, expected COLUMN>VALUE"), "{error}");
