@@ -41,6 +41,7 @@ pub mod machine;
 pub mod runs;
 pub mod streamed;
 pub mod linked;
+mod homing;
 pub mod panel;
 pub mod console;
 pub mod operator;

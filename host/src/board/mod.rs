@@ -11,6 +11,7 @@
 //! - [`sender`]: drives a job, step by step;
 //! - [`stops`]: what a program says where it stops;
 //! - [`jog`]: jogs of a machine on a board;
+//! - [`home`]: homing of a machine on a board;
 //! - [`progress`]: how far a program is for sure;
 //! - [`scope`]: every tick of a board; [`trigger`]: those around a condition;
 //! - [`interface`]: a board as an operator has it; [`operated`]: one at a port;
@@ -28,6 +29,7 @@ pub mod from_line;
 pub mod sender;
 pub mod stops;
 pub mod jog;
+pub mod home;
 pub mod progress;
 pub mod scope;
 pub mod trigger;

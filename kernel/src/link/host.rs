@@ -242,6 +242,17 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         })
     }
 
+    /// Has `axes` homed, the lowest bit is the first one's, one after the other; what there was before is given up. A hold or an
+    /// abort ends it, and a silence of `dead_man_ms`. See [`Self::abort`].
+    #[must_use]
+    pub fn home(&mut self, axes: u16, dead_man_ms: u16) -> bool {
+        self.give_up(0, |controls| {
+            (controls.mode, controls.presses) = (Mode::Run, controls.presses.wrapping_add(1));
+            (controls.home_axes, controls.homings) = (axes, controls.homings.wrapping_add(1));
+            controls.dead_man_ms = dead_man_ms;
+        })
+    }
+
     /// Clears the board's fault. See [`Self::control`].
     #[must_use]
     pub fn clear_fault(&mut self) -> bool {

@@ -40,5 +40,7 @@ mod tests;
 pub use board::{BoardLink, Came, ItemQueue};
 pub use frame::{Deframer, FRAME_MAX};
 pub use host::{Event, HostLink, PushError};
-pub use message::{Controls, Identity, Mode, PROTOCOL, Piece, State, Status, WriteError};
+pub use message::{
+    Controls, HomingFailure, HomingProgress, Identity, Mode, PROTOCOL, Piece, State, Status, WriteError,
+};
 pub use parameters::ParameterBuffer;

@@ -213,6 +213,10 @@ impl<'a, R: Real, const AXES: usize> Replay<'a, R, AXES> {
         self.tripped.clear();
         self.trips = trips.into_iter().flatten().collect();
         self.stage = Stage::Following;
+        if begun.is_own {
+            self.lose_items(on_told);
+            return Ok(());
+        }
         // What the board's tick has passed already.
         for _ in 0..intake.path_taken.wrapping_sub(begun.path_entered) {
             if self.next_path_item(items)?.is_none() {
@@ -282,6 +286,9 @@ impl<'a, R: Real, const AXES: usize> Replay<'a, R, AXES> {
                 HANDED => {
                     let handed = bytes.value().ok_or_else(|| self.malformed())?;
                     self.hand(&handed)?;
+                    if matches!(handed, Handed::Restart { program: Begun { is_own: true, .. }, .. }) {
+                        self.lose_items(on_told);
+                    }
                 }
                 TRIP => {
                     let kind: FaultKind<R> = bytes.value().ok_or_else(|| self.malformed())?;
@@ -329,6 +336,9 @@ impl<'a, R: Real, const AXES: usize> Replay<'a, R, AXES> {
                 self.kernel.clear_fault();
             }
             Command::Resume => self.kernel.resume(),
+            Command::Reference { axis, counts, position } => {
+                self.kernel.reference(axis.into(), counts, position);
+            }
         }
     }
 
