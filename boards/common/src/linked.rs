@@ -11,6 +11,7 @@ use core::convert::Infallible;
 
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{Fault, FaultKind};
+use motion_kernel::flight::frame_max;
 use motion_kernel::hal::OutputState;
 use motion_kernel::homing::{HomingFigures, HomingInput, HomingStep};
 use motion_kernel::jog::Jog;
@@ -35,6 +36,8 @@ use crate::streamed::{Requests, Streamed};
 
 /// Time between two messages about the machine \[ms\].
 const STATUS_MS: u32 = 20;
+/// The longest frame of a row of the flight recorder \[bytes\].
+const FLIGHT_FRAME_MAX: usize = frame_max(9);
 
 /// The background. `ITEMS` and `PLACES` are those of [`Streamed`]; there is room for `PARAMETERS` bytes of new parameters (three
 /// axes of the reference machine take 578, nine less than 1800, and each that is homed less than 110 more), none on a board that can't store them.
@@ -417,6 +420,10 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
         if now_ms.wrapping_sub(self.status_ms) < STATUS_MS {
             let length = self.streamed.transmit(now_ms, None, out);
             // In the room that is left.
+            if length > 0 {
+                return length;
+            }
+            let length = self.transmit_flight(control, out);
             return if length > 0 { length } else { self.transmit_scope(control, out) };
         }
         self.status_ms = now_ms;
@@ -460,6 +467,24 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
             }),
             out,
         )
+    }
+
+    /// The row of the flight recorder that is asked for. Before a fault there is none: its rows change with every tick.
+    #[inline(never)]
+    fn transmit_flight<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+        out: &mut [u8],
+    ) -> usize {
+        let link = self.streamed.link_mut();
+        let Some(number) = link.flight_row() else { return 0 };
+        let (rows, row) = control.lock(|control| {
+            let flight = &control.flight;
+            if flight.is_frozen() { (flight.count(), flight.row(number.into()).copied()) } else { (0, None) }
+        });
+        let mut bytes = [0; FLIGHT_FRAME_MAX];
+        let frame = row.and_then(|row| row.to_frame(&mut bytes)).unwrap_or_default();
+        link.transmit_flight(rows as u16, frame, out)
     }
 
     /// The next frame of the scope.
@@ -555,7 +580,7 @@ fn machine_state(is_off: bool, live: State, tick: ExecState) -> MachineState {
 mod tests {
     use hal_sim::{HomeParameters, IndexParameters, SimHome, SwitchParameters};
     use motion_kernel::fault::FaultKind;
-    use motion_kernel::flight::FlightRecorder;
+    use motion_kernel::flight::{FlightRecorder, FlightRow};
     use motion_kernel::hal::Spindle;
     use motion_kernel::homing::{AxisHoming, Homed, HomingConfig};
     use motion_kernel::jog::Direction;
@@ -600,6 +625,9 @@ mod tests {
         /// So many frames in a thousand are cut, in both directions.
         loses: u64,
         random: Random,
+        /// Rows of the flight recorder that have come.
+        flight: Vec<FlightRow<f64, AXES>>,
+        flight_rows: Option<u16>,
     }
 
     impl Operator {
@@ -659,6 +687,8 @@ mod tests {
             is_silent: false,
             loses: 0,
             random: Random(7),
+            flight: Vec::new(),
+            flight_rows: None,
         };
         let (mut out, mut to_board) = ([0; FRAME_MAX], std::collections::VecDeque::new());
         let (mut states, mut lines): (Vec<(State, _)>, _) = (Vec::new(), Vec::new());
@@ -666,8 +696,19 @@ mod tests {
             if script(now, &mut operator) {
                 return Seen { states, drives, lines };
             }
-            let Operator { host, items, status, is_ready, unhealthy, is_held, is_silent, loses, random } =
-                &mut operator;
+            let Operator {
+                host,
+                items,
+                status,
+                is_ready,
+                unhealthy,
+                is_held,
+                is_silent,
+                loses,
+                random,
+                flight,
+                flight_rows,
+            } = &mut operator;
             let mut cut = |length: usize| {
                 if random.below(1000) < *loses { random.below(length as u64 + 1) as usize } else { length }
             };
@@ -694,6 +735,10 @@ mod tests {
                     *status = Some(told);
                 }
                 Event::Ready { .. } => *is_ready = true,
+                Event::Flight { rows, kept, .. } => {
+                    flight.extend(kept);
+                    *flight_rows = Some(rows);
+                }
                 Event::Welcome(found) => assert_eq!(found, identity(ITEMS)),
                 other => panic!("{other:?}"),
             });
@@ -1262,6 +1307,56 @@ mod tests {
             }
             step == 5
         });
+    }
+
+    /// Nothing before a fault; then every row once and in order, however many frames are lost; nothing after the fault is cleared.
+    #[test]
+    fn the_flight_recorder_is_read() {
+        for loses in [0, 300] {
+            let (mut step, mut since) = (0, 0);
+            board(|now, operator| {
+                match step {
+                    0 if operator.status.is_some() => {
+                        operator.loses = loses;
+                        operator.host.read_flight(0);
+                        step = 1;
+                    }
+                    1 if operator.flight_rows.take() == Some(0) => {
+                        assert!(operator.flight.is_empty());
+                        operator.unhealthy = Some(FaultKind::EmergencyStop);
+                        (step, since) = (2, now);
+                    }
+                    2 if now > since + 100 => {
+                        operator.host.read_flight(0);
+                        step = 3;
+                    }
+                    3 if operator.flight_rows.take().is_some() => {
+                        let count = operator.flight.len();
+                        if count < 16 {
+                            operator.host.read_flight(count as u16);
+                            return false;
+                        }
+                        let first = operator.flight[0].tick;
+                        let ticks: Vec<u64> = operator.flight.iter().map(|row| row.tick).collect();
+                        assert_eq!(ticks, (first..first + 16).collect::<Vec<_>>());
+                        // Eight of them behind the fault's.
+                        let faulted = operator.flight.iter().position(|row| row.is_faulted);
+                        assert_eq!((faulted, operator.flight[7].tick), (Some(7), u64::from(since) - 1));
+                        operator.unhealthy = None;
+                        operator.flight.clear();
+                        assert!(operator.host.clear_fault());
+                        (step, since) = (4, now);
+                    }
+                    4 if now > since + 2000 => {
+                        operator.host.read_flight(0);
+                        step = 5;
+                    }
+                    5 if operator.flight_rows == Some(0) => return operator.flight.is_empty(),
+                    _ => {}
+                }
+                false
+            });
+        }
     }
 
     /// Somebody else asks while a key is pressed: the board holds at once, though the other one is not silent.

@@ -142,6 +142,14 @@ pub enum BoardError {
         /// Which there are.
         names: String,
     },
+    /// The flight recorder runs again.
+    #[error("found a fault that was cleared while its ticks were read, expected it to stay")]
+    FlightCleared,
+    /// The flight recorder has kept nothing.
+    #[error(
+        "found an empty flight recorder, expected a fault since the board started, or since the last one was cleared"
+    )]
+    NoFlight,
     /// The board was reset.
     #[error(
         "found a board that has started anew, expected it to go on: it had confirmed {confirmed} items{at}"
@@ -229,6 +237,8 @@ impl BoardError {
             | Self::Replaced
             | Self::Moves
             | Self::NotHomed { .. }
+            | Self::FlightCleared
+            | Self::NoFlight
             | Self::NoParameters(_)
             | Self::Simulator(_)
             | Self::Scope(_)

@@ -16,6 +16,7 @@
 //! - [`scope`]: every tick of a board; [`trigger`]: those around a condition;
 //! - [`interface`]: a board as an operator has it; [`operated`]: one at a port;
 //! - [`parameters`]: a board's parameters, read, written and compared;
+//! - [`flight`]: the ticks that its flight recorder has kept;
 //! - [`simulator`]: a board with a simulated machine, in a thread or behind an address;
 //! - [`emulated`]: a board in an emulator;
 //! - [`error`]: what boards and wires refuse.
@@ -36,6 +37,7 @@ pub mod trigger;
 pub mod interface;
 pub mod operated;
 pub mod parameters;
+pub mod flight;
 pub mod simulator;
 pub mod emulated;
 pub mod error;

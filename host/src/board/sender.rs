@@ -223,7 +223,8 @@ impl<const M: usize> Sender<M> {
             | Event::Status(_)
             | Event::Parameters { .. }
             | Event::Written { .. }
-            | Event::Scope { .. } => Ok(()),
+            | Event::Scope { .. }
+            | Event::Flight { .. } => Ok(()),
         }
     }
 

@@ -27,6 +27,8 @@ pub(super) enum Request {
     /// Switches the scope on, with another snapshot if `after` is not answered yet: the number of the last snapshot that is of
     /// no use any more. None switches it off.
     Scope { session: u32, asker: u32, after: Option<u32> },
+    /// Asks for a row of the flight recorder, from 0.
+    Flight { session: u32, asker: u32, row: u16 },
 }
 
 /// Parameters on their way: how many bytes, their checksum, and which attempt it is.
@@ -98,6 +100,9 @@ pub(super) enum Reply<const AXES: usize> {
     /// Of the scope: what follows, to the payload's end, is to be read in order. The number of the snapshot before it, and
     /// which frame since that it is.
     Scope { session: u32, epoch: u32, number: u32 },
+    /// A row of the flight recorder follows, as a frame, to the payload's end; of so many. Without one nothing follows: there was
+    /// no fault since the start, or since the last one was cleared, or it is too young.
+    Flight { session: u32, row: u16, rows: u16 },
 }
 
 /// What has come to the board.

@@ -11,6 +11,7 @@
 //!           ── parameters, in pieces, while drives are off ────►            ─► ParameterBuffer
 //!           ◄── taken: which came, how many more may ───────────            ◄─ ItemQueue
 //!           ◄── status: position, feed, line, fault ────────────            ◄─ Status        may be lost
+//!           ◄── flight recorder, row by row, as asked for ────            ◄─ FlightRecorder
 //!           ◄── scope: what every tick consumed ───────────────            ◄─ BoardScope    may be lost
 //! ```
 //!

@@ -18,7 +18,7 @@ use crate::live::ListItem;
 use crate::num::Real;
 use crate::program::supply::Ready;
 use crate::program::{Header, Item};
-use crate::queue::{Change, Intake, IntakeState, LiveFeeder, LiveStreams, PathItem};
+use crate::queue::{Change, Intake, IntakeState, LISTS, LiveFeeder, LiveStreams, PathItem};
 use crate::trace::Trace;
 use crate::units::{Counts, Position};
 
@@ -308,6 +308,14 @@ impl<'a, R: Real, const AXES: usize> Replay<'a, R, AXES> {
     /// Does what the board's background did.
     fn hand(&mut self, handed: &Handed<AXES>) -> Result<(), ReplayError> {
         match *handed {
+            Handed::Begin { list }
+            | Handed::Item { list, .. }
+            | Handed::Kept { list, .. }
+            | Handed::GiveUp { list }
+                if list >= LISTS =>
+            {
+                return Err(self.malformed());
+            }
             Handed::Begin { list } => {
                 // The board's tick has emptied it.
                 self.intake.clear_list(list);

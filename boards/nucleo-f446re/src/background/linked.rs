@@ -6,6 +6,7 @@
 use core::sync::atomic::Ordering;
 
 use motion_board::LogLine;
+use motion_kernel::homing::HomingFigures;
 use motion_kernel::law::Pulse;
 use motion_kernel::link::{BoardLink, Identity, PROTOCOL};
 use motion_kernel::program::FORMAT;
@@ -31,6 +32,7 @@ pub(crate) struct Background {
     /// Until it runs.
     feeder: Option<Feeder>,
     pulse: Pulse,
+    homing: HomingFigures<AXES>,
     identity: Identity,
     button: ButtonPin,
     port: Line,
@@ -66,12 +68,13 @@ impl Background {
             outputs: BOARD.outputs,
             machine: machine.program.machine_checksum(),
         };
-        (Self { feeder: Some(feeder), pulse: header.pulse, identity, button, port }, intake, OfTick)
+        let (pulse, homing) = (header.pulse, machine.homing);
+        (Self { feeder: Some(feeder), pulse, homing, identity, button, port }, intake, OfTick)
     }
 
     /// Runs forever.
     pub(crate) fn run(&'static mut self, mut control: impl Mutex<T = Control>) -> ! {
-        let Self { feeder, pulse, identity, button, port } = self;
+        let Self { feeder, pulse, homing, identity, button, port } = self;
         board::write(&LogLine::<Number, AXES>::Linked);
         while !port.has_come() {
             count_step();
@@ -81,6 +84,7 @@ impl Background {
         // first byte comes, which its clock decides and not this one's: here in cycles of 6 ns since the start.
         let mut linked = begin(cycles(), identity, defmt::unwrap!(feeder.take()), *pulse);
         linked.set_parameters(PROGRAM);
+        linked.set_homing(homing, *pulse);
         let mut clock = Clock { ticks: 0, ms: 0 };
         loop {
             wait_for_tick();
