@@ -492,10 +492,10 @@ fn a_board_gets_other_parameters() {
     let mut damaged = second.clone();
     damaged[100] ^= 1;
     let slow = parameters::<3, 3>(&Machine { tick_s: 0.001, ..Machine::reference() });
-    for bad in [damaged, slow, vec![1; 3000]] {
+    for bad in [damaged, slow, vec![1; 5000]] {
         let refused = write(&mut connection, &bad);
         let is_refused = match bad.len() {
-            3000 => matches!(refused, Err(BoardError::Parameters(WriteError::Length { room: 2048 }))),
+            5000 => matches!(refused, Err(BoardError::Parameters(WriteError::Length { room: 4096 }))),
             _ => matches!(refused, Err(BoardError::Parameters(WriteError::Unsuitable))),
         };
         assert!(is_refused, "{refused:?}");

@@ -213,6 +213,10 @@ fn one_tab_commands_and_any_may_stop() {
     // Whoever commands first.
     first.say(r#"{"do": "override", "permille": 900}"#);
     noted.wait_for("override 900", 1);
+    first.say(r#"{"do": "home"}"#);
+    noted.wait_for("home []", 1);
+    first.say(r#"{"do": "home", "axis": "X"}"#);
+    noted.wait_for("home [\"X\"]", 1);
     second.say(r#"{"do": "override", "permille": 100}"#);
     let refused = second.hears("refused");
     assert!(refused["text"].as_str().is_some_and(|text| text.starts_with("another tab")), "{refused}");
@@ -228,10 +232,6 @@ fn one_tab_commands_and_any_may_stop() {
         second.say(command);
         second.hears("refused");
     }
-    first.say(r#"{"do": "home"}"#);
-    noted.wait_for("home []", 1);
-    first.say(r#"{"do": "home", "axis": "X"}"#);
-    noted.wait_for("home [\"X\"]", 1);
     second.say(r#"{"do": "take"}"#);
     second.hears_commander("you");
     first.hears_commander("another");
