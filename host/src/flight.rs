@@ -4,7 +4,8 @@
 //! hexadecimal, whatever is before or behind it; produces the ticks as those of a run. Lines without a frame
 //! are passed over. Fails at the first frame that is damaged, with its line.
 
-use motion_kernel::flight::{FlightRow, FrameError};
+use motion_kernel::flight::{FlightAxis, FlightRow, FrameError};
+use motion_kernel::units::{Counts, DacCode, Position};
 
 use crate::machine::Machine;
 use crate::simulate::contour::Contour;
@@ -75,6 +76,25 @@ fn frame(line: usize, text: &str) -> Result<Vec<u8>, FlightError> {
         u8::from_str_radix(digits, 16).map_err(|_| refused(part))
     };
     bytes.split(',').map(byte).collect()
+}
+
+/// A row with places for all axes of a machine; those behind its own stand still.
+#[must_use]
+pub fn with_places<const M: usize, const N: usize>(row: &FlightRow<f64, M>) -> FlightRow<f64, N> {
+    let &FlightRow { tick, motion, stretches, line, state, emergency_stop, is_faulted, ref axes } = row;
+    let still = FlightAxis {
+        counts: Counts(0),
+        set: Position::ZERO,
+        velocity_mm_s: 0.0,
+        accel_mm_s2: 0.0,
+        jerk_mm_s3: 0.0,
+        following_error_mm: 0.0,
+        code: DacCode::ZERO,
+        saturated: false,
+        inputs: 0,
+    };
+    let axes = std::array::from_fn(|axis| axes.get(axis).copied().unwrap_or(still));
+    FlightRow { tick, motion, stretches, line, state, emergency_stop, is_faulted, axes }
 }
 
 /// The rows as ticks of a run of `machine`; the path position counts from the start of each stretch.

@@ -8,6 +8,8 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use hal_sim::{HomeParameters, IndexParameters, SwitchParameters};
+use motion_host::board::home::{OnBoardHoming, mask};
 use motion_host::board::items::{InPlanning, Source};
 use motion_host::board::job::parameters;
 use motion_host::board::jog::Jogs;
@@ -17,12 +19,15 @@ use motion_host::board::sender::{Found, Permissions};
 use motion_host::board::simulator::{self, SimulatedBoard};
 use motion_host::board::{BoardError, Connection, Heard, Job, Port, Scope, Sender, Step};
 use motion_host::gcode::ReadOptions;
-use motion_host::machine::Machine;
+use motion_host::machine::{HomingSettings, Machine};
 use motion_host::planning::Executable;
+use motion_host::simulate::home::{HomedAxis, Homes};
 use motion_host::simulate::jog::{Ended, Keys, Press};
-use motion_kernel::link::{State, WriteError};
+use motion_kernel::homing::{Homed, HomingConfig};
+use motion_kernel::jog::Direction;
+use motion_kernel::link::{HomingFailure, HomingProgress, State, WriteError};
 use motion_kernel::program::Item;
-use motion_kernel::units::Position;
+use motion_kernel::units::{Counts, Position};
 use motion_tests::check::planned;
 
 /// So many times as fast as the wall clock.
@@ -487,10 +492,10 @@ fn a_board_gets_other_parameters() {
     let mut damaged = second.clone();
     damaged[100] ^= 1;
     let slow = parameters::<3, 3>(&Machine { tick_s: 0.001, ..Machine::reference() });
-    for bad in [damaged, slow, vec![1; 3000]] {
+    for bad in [damaged, slow, vec![1; 5000]] {
         let refused = write(&mut connection, &bad);
         let is_refused = match bad.len() {
-            3000 => matches!(refused, Err(BoardError::Parameters(WriteError::Length { room: 2048 }))),
+            5000 => matches!(refused, Err(BoardError::Parameters(WriteError::Length { room: 4096 }))),
             _ => matches!(refused, Err(BoardError::Parameters(WriteError::Unsuitable))),
         };
         assert!(is_refused, "{refused:?}");
@@ -563,6 +568,138 @@ fn a_jog_ends_by_itself_by_its_release_or_by_the_dead_man() {
     assert!(rest_mm > cut_mm && rest_mm < cut_mm + most_mm, "{cut_mm} {rest_mm}");
     let back = jogs.press(3, &mut connection, &mut || false).expect("a jog");
     assert!(back.from_mm == rest_mm && (back.to_mm - rest_mm + 1.0).abs() < 1e-9, "{back:?}");
+}
+
+/// The reference machine, with a home switch at X and one with an index at Y.
+fn homed_machine() -> Machine {
+    let mut machine = Machine::reference();
+    let mm = |mm| Position::from_mm(mm).expect("in range");
+    for (axis, (direction, index_mm)) in
+        [(Direction::Negative, None), (Direction::Positive, Some(11.0))].into_iter().enumerate()
+    {
+        let config = HomingConfig {
+            direction,
+            fast_mm_s: 40.0,
+            slow_mm_s: 2.0,
+            travel_mm: 100.0,
+            back_off_mm: 60.0,
+            index_mm,
+            position: mm(-7.0),
+            park: Some(mm(1.5)),
+        };
+        let closes_mm = if axis == 0 { (-60.0, -23.456) } else { (31.5, 70.0) };
+        let simulated = HomeParameters {
+            switch: Some(SwitchParameters { closes_mm, hysteresis_mm: 0.2 }),
+            index: index_mm.map(|_| IndexParameters { counts: 100_000, at: Counts(345_678) }),
+        };
+        machine.axes[axis].homing = Some(HomingSettings { config, simulated });
+    }
+    machine
+}
+
+/// On a board the references are those of the simulated machine without one, to the count. A program and a jog follow; what
+/// ends homing early ends it at rest.
+#[test]
+fn a_board_homes_as_the_simulated_machine_does() {
+    let machine = homed_machine();
+    let mut expected = Vec::new();
+    Homes::new(&machine, &[]).expect("two axes").home(&mut expected, &mut |_| {}).expect("homed");
+    let (_board, address) = board(&machine, 50);
+    let cable = Cable::to(address);
+    let mut connection = connect(cable.address, 50);
+    let job = Arc::new(Job::<3>::new(&machine, &[]));
+    let homing = OnBoardHoming { machine: &machine, job, may: ENABLES, dead_man_ms: 60_000 };
+    let all = mask(&machine, &[]).expect("two axes");
+    let mut found = Vec::new();
+    let given_up = homing.home(all, &mut connection, &mut found, &mut || false, &mut |_, _| {});
+    assert!(!given_up.expect("homed"));
+    assert_eq!(connection.controls().dead_man_ms, 0);
+    let references = |found: &[HomedAxis]| -> Vec<(String, Homed)> {
+        found.iter().map(|axis| (axis.name.clone(), axis.homed)).collect()
+    };
+    assert_eq!(references(&found), references(&expected));
+    assert_eq!(found[1].homed.counts, Counts(345_678));
+    let homed =
+        |connection: &Connection<3>| connection.status().expect("told").homed.map(|homed| homed.is_some());
+    assert_eq!(homed(&connection), [true, true, false]);
+    let park = Position::from_mm(1.5).expect("in range");
+    assert_eq!(stands(&connection), [park, park, Position::ZERO]);
+    // Given up in the search, by name; Y stays homed.
+    let mut stages = 0;
+    let given_up = std::cell::Cell::new(false);
+    let mut found = Vec::new();
+    let ended = homing.home(1, &mut connection, &mut found, &mut || given_up.get(), &mut |axis, _| {
+        assert_eq!(axis, "X");
+        stages += 1;
+        given_up.set(true);
+    });
+    assert!(ended.expect("given up") && found.is_empty() && stages == 1);
+    let told = connection.status().expect("told").homing;
+    assert_eq!(told, HomingProgress::Failed { axis: 0, failure: HomingFailure::Aborted });
+    assert_eq!(homed(&connection), [false, true, false]);
+    let program = self::job(&zigzag(5), &machine);
+    assert_eq!(drive(&program, ENABLES, &mut connection, |_, _, _| false).expect("driven"), Step::Done);
+    assert_eq!(stands(&connection), end(&program));
+    // An axis without settings.
+    let ended = homing.home(0b100, &mut connection, &mut found, &mut || false, &mut |_, _| {});
+    let is_it = matches!(&ended, Err(BoardError::NotHomed { axis, failure: HomingFailure::NoSettings }) if axis == "Z");
+    assert!(is_it, "{ended:?}");
+}
+
+/// The flight recorder of a board: empty before a fault, all of its ticks after it.
+#[test]
+fn a_boards_flight_recorder_is_read() {
+    let machine = Machine::reference();
+    let (board, address) = board(&machine, 52);
+    let mut connection = connect(address, 52);
+    let nothing = motion_host::board::flight::read(&mut connection).expect("an answer");
+    assert!(nothing.is_empty());
+    board.set_emergency_stop(true);
+    let begin = Instant::now();
+    let rows = loop {
+        let rows = motion_host::board::flight::read(&mut connection).expect("an answer");
+        if !rows.is_empty() {
+            break rows;
+        }
+        assert!(begin.elapsed() < LONGEST);
+    };
+    assert_eq!(rows.len(), 64);
+    assert!(rows.windows(2).all(|pair| pair[1].tick == pair[0].tick + 1));
+    assert_eq!(rows.iter().filter(|row| row.is_faulted).count(), 17);
+}
+
+/// The asker is gone in the middle: the board ends homing at rest, by its dead man, and tells the next one why.
+#[test]
+fn homing_of_an_asker_that_is_gone_ends_at_rest() {
+    let machine = homed_machine();
+    let (_board, address) = board(&machine, 51);
+    let mut connection = connect(address, 51);
+    let job = Arc::new(Job::<3>::new(&machine, &[]));
+    let homing = OnBoardHoming { machine: &machine, job, may: ENABLES, dead_man_ms: 20_000 };
+    let mut seen = 0;
+    let gone = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+        let _ = homing.home(0b11, &mut connection, &mut Vec::new(), &mut || false, &mut |axis, _| {
+            seen += 1;
+            assert!(axis != "X" || seen < 2, "killed");
+        });
+    }));
+    assert!(gone.is_err());
+    drop(connection);
+    let mut connection = connect(address, 52);
+    let begin = Instant::now();
+    let failed = loop {
+        assert!(begin.elapsed() < LONGEST, "{:?}", connection.status());
+        connection.step(Duration::from_millis(1), &mut |_| {});
+        if let Some(status) = connection.status()
+            && let HomingProgress::Failed { failure, .. } = status.homing
+        {
+            break failure;
+        }
+    };
+    // By the silence, or by the next one's question.
+    assert!(matches!(failed, HomingFailure::Silent | HomingFailure::Aborted), "{failed:?}");
+    let status = *connection.status().expect("told");
+    assert_eq!((status.state, status.homed), (State::Held, [None; 3]));
 }
 
 /// Where X stands, as told last \[mm\].

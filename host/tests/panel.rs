@@ -121,6 +121,11 @@ impl Board for Noting {
         self.under_way = UnderWay::Nothing;
     }
 
+    fn home(&mut self, axes: &[String]) -> Result<(), BoardError> {
+        self.noted.note(format!("home {axes:?}"));
+        Ok(())
+    }
+
     fn watch_ticks(&mut self) -> Result<(), BoardError> {
         Ok(())
     }
@@ -137,7 +142,8 @@ impl Board for Noting {
 
 fn desk() -> (Desk, Noted) {
     let noted = Noted::default();
-    let axis = BoardAxis { name: "X".to_owned(), unit: "mm", travel_mm: None, feed_mm_s: 300.0 };
+    let axis =
+        BoardAxis { name: "X".to_owned(), unit: "mm", travel_mm: None, feed_mm_s: 300.0, has_homing: true };
     let info = BoardInfo {
         machine: "noting".to_owned(),
         port: "nowhere".to_owned(),
@@ -207,6 +213,10 @@ fn one_tab_commands_and_any_may_stop() {
     // Whoever commands first.
     first.say(r#"{"do": "override", "permille": 900}"#);
     noted.wait_for("override 900", 1);
+    first.say(r#"{"do": "home"}"#);
+    noted.wait_for("home []", 1);
+    first.say(r#"{"do": "home", "axis": "X"}"#);
+    noted.wait_for("home [\"X\"]", 1);
     second.say(r#"{"do": "override", "permille": 100}"#);
     let refused = second.hears("refused");
     assert!(refused["text"].as_str().is_some_and(|text| text.starts_with("another tab")), "{refused}");
@@ -218,8 +228,10 @@ fn one_tab_commands_and_any_may_stop() {
         second.say(command);
         noted.wait_for(call, 1);
     }
-    second.say(r#"{"do": "drives", "are_on": true}"#);
-    second.hears("refused");
+    for command in [r#"{"do": "drives", "are_on": true}"#, r#"{"do": "home"}"#] {
+        second.say(command);
+        second.hears("refused");
+    }
     second.say(r#"{"do": "take"}"#);
     second.hears_commander("you");
     first.hears_commander("another");

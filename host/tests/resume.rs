@@ -21,7 +21,8 @@ use motion_host::simulate::hardware::{SimulatedHardware, simulated};
 use motion_kernel::axis::Feedforward;
 use motion_kernel::flight::FlightRecorder;
 use motion_kernel::hal::{
-    BoardOutputs, DriveEnable, Encoder, Inputs, MachineInputs, OutputState, Outputs, VelocityChannel,
+    BoardOutputs, DriveEnable, Encoder, IndexLatch, Inputs, MachineInputs, OutputState, Outputs,
+    VelocityChannel,
 };
 use motion_kernel::kernel::Kernel;
 use motion_kernel::law::PathMotion;
@@ -77,6 +78,16 @@ impl<'a> DriveEnable<3> for Recorded<'a> {
     type Error = <SimulatedHardware<'a, 3> as DriveEnable<3>>::Error;
     fn set_enabled(&mut self, enabled: bool) -> Result<(), Self::Error> {
         self.machine.set_enabled(enabled)
+    }
+}
+
+impl IndexLatch for Recorded<'_> {
+    type Error = Infallible;
+    fn arm(&mut self, axis: usize) -> Result<(), Infallible> {
+        self.machine.arm(axis)
+    }
+    fn latched(&mut self, axis: usize) -> Result<Option<Counts>, Infallible> {
+        self.machine.latched(axis)
     }
 }
 

@@ -324,6 +324,12 @@ impl<R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize> FlightRe
         matches!(self.fault, Some((_, 0)))
     }
 
+    /// Number of rows.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.rows.len()
+    }
+
     /// The row `index` ticks after the oldest.
     #[must_use]
     pub fn row(&self, index: usize) -> Option<&FlightRow<R, AXES>> {

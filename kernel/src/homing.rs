@@ -21,12 +21,15 @@
 //! Every stage is bounded by a length; if nothing is found within it, homing ends at rest with a
 //! [`HomingError`].
 
+use serde::{Deserialize, Serialize};
+
 use crate::jog::{Direction, Jog, JogAxis, JogError, JogTarget};
+use crate::law::{Limits, Pulse};
 use crate::live::State;
 use crate::units::{Counts, Position};
 
 /// How an axis is homed.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HomingConfig {
     /// Where the switch is.
     pub direction: Direction,
@@ -46,6 +49,55 @@ pub struct HomingConfig {
     pub position: Position,
     /// Where the axis goes afterwards.
     pub park: Option<Position>,
+}
+
+/// How an axis of a board is homed, and what it may do meanwhile.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AxisHoming {
+    /// How it is homed.
+    pub config: HomingConfig,
+    /// Its greatest feed \[mm/s\], see [`JogAxis::feed_mm_s`].
+    pub feed_mm_s: f64,
+    /// Limits of its ramps, see [`JogAxis::limits`].
+    pub limits: Limits<f64>,
+}
+
+impl AxisHoming {
+    /// Homing of `axis` with pulses of jerk of this shape, for ticks of `tick_s`.
+    #[must_use]
+    pub fn start(&self, axis: usize, pulse: Pulse, tick_s: f64) -> Homing {
+        let &Self { config, feed_mm_s, limits } = self;
+        Homing::new(config, &JogAxis { feed_mm_s, limits, pulse, travel: None }, axis, tick_s)
+    }
+}
+
+/// How the axes of a machine are homed; a compiled program carries it. `None` for an axis that is not.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HomingFigures<const AXES: usize> {
+    /// Figures of each axis.
+    #[serde(with = "crate::array")]
+    pub axes: [Option<AxisHoming>; AXES],
+}
+
+impl<const AXES: usize> HomingFigures<AXES> {
+    /// No axis is homed.
+    pub const NONE: Self = Self { axes: [None; AXES] };
+}
+
+/// What homing of an axis is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "link", derive(postcard_schema::Schema))]
+pub enum HomingStage {
+    /// Searches the switch, at the fast feed.
+    Search,
+    /// Backs off the switch.
+    BackOff,
+    /// Approaches the switch, at the slow feed.
+    Approach,
+    /// Looks for the index.
+    Index,
+    /// Has its reference, and goes to the park position.
+    Park,
 }
 
 /// What a tick has seen of the axis.
@@ -83,8 +135,9 @@ pub enum HomingStep<const AXES: usize> {
 }
 
 /// The reference that was found.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "link", derive(postcard_schema::Schema))]
 pub struct Homed {
     /// The encoder's counts at the reference.
     pub counts: Counts,
@@ -120,6 +173,8 @@ pub enum HomingError {
         /// Within this length beyond the switch \[mm\].
         index_mm: f64,
     },
+    /// The board has no index input for the axis.
+    NoLatch,
     /// Homing was aborted.
     Aborted,
     /// The move could not be executed.
@@ -142,6 +197,7 @@ impl core::fmt::Display for HomingError {
             Self::NoIndex { index_mm } => {
                 write!(f, "no index within {index_mm} mm of the home switch: expected one a revolution")
             }
+            Self::NoLatch => f.write_str("no index input for this axis: expected one, or index_mm 0"),
             Self::Aborted => f.write_str("homing was given up"),
             Self::Failed => f.write_str("a move of homing can't be executed"),
         }
@@ -192,7 +248,8 @@ pub struct Homing {
     stage: Stage,
     /// Where the stage's move began.
     from: Position,
-    is_aborted: bool,
+    /// Why it is to end early.
+    ends: Option<HomingError>,
 }
 
 impl Homing {
@@ -201,12 +258,31 @@ impl Homing {
     #[must_use]
     pub fn new(config: HomingConfig, jog: &JogAxis, axis: usize, tick_s: f64) -> Self {
         let jog = JogAxis { travel: None, ..*jog };
-        Self { config, jog, axis, tick_s, stage: Stage::Start, from: Position::ZERO, is_aborted: false }
+        Self { config, jog, axis, tick_s, stage: Stage::Start, from: Position::ZERO, ends: None }
     }
 
     /// Aborts: the axis comes to rest, then [`Homing::poll`] returns [`HomingError::Aborted`].
     pub fn abort(&mut self) {
-        self.is_aborted = true;
+        self.ends = Some(HomingError::Aborted);
+    }
+
+    /// The index can't be armed: as [`Homing::abort`], with [`HomingError::NoLatch`].
+    pub fn lacks_index(&mut self) {
+        self.ends = Some(HomingError::NoLatch);
+    }
+
+    /// What it is doing.
+    #[must_use]
+    pub fn stage(&self) -> HomingStage {
+        match self.stage {
+            Stage::Start | Stage::Seek | Stage::Stopping(After::BackOff | After::Error(_)) | Stage::Ended => {
+                HomingStage::Search
+            }
+            Stage::BackOff { .. } | Stage::Stopping(After::Approach) => HomingStage::BackOff,
+            Stage::Approach => HomingStage::Approach,
+            Stage::Index { .. } | Stage::Stopping(After::Reference(_)) => HomingStage::Index,
+            Stage::Referenced(_) | Stage::Park(_) => HomingStage::Park,
+        }
     }
 
     /// One poll, after a tick: returns what to do before the next one.
@@ -229,13 +305,17 @@ impl Homing {
         let is_at_rest = matches!(seen.state, State::Done | State::Aborted);
         match self.stage {
             Stage::Ended => return Ok(HomingStep::Wait),
-            Stage::Start if self.is_aborted => return Err(HomingError::Aborted),
-            Stage::Start => {}
-            _ if seen.state == State::Failed => return Err(HomingError::Failed),
-            _ if core::mem::take(&mut self.is_aborted) => {
-                return Ok(self.stop(After::Error(HomingError::Aborted)));
+            Stage::Start => {
+                if let Some(error) = self.ends {
+                    return Err(error);
+                }
             }
-            _ => {}
+            _ if seen.state == State::Failed => return Err(HomingError::Failed),
+            _ => {
+                if let Some(error) = self.ends.take() {
+                    return Ok(self.stop(After::Error(error)));
+                }
+            }
         }
         let HomingConfig { travel_mm, back_off_mm, index_mm, .. } = self.config;
         match self.stage {

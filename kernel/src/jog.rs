@@ -50,13 +50,15 @@
 
 use core::convert::Infallible;
 
+use serde::{Deserialize, Serialize};
+
 use crate::law::{Limits, Pulse};
 use crate::program::Item;
 use crate::straight::{Straight, StraightError};
 use crate::units::Position;
 
 /// A direction along an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Direction {
     /// To greater positions.

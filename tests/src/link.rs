@@ -1,7 +1,7 @@
 //! What boards on the link say of themselves, for tests that need one.
 
 use motion_kernel::hal::BoardOutputs;
-use motion_kernel::link::{Build, Identity, State, Status};
+use motion_kernel::link::{Build, HomingProgress, Identity, State, Status};
 use motion_kernel::program::FORMAT;
 use motion_kernel::units::Position;
 
@@ -32,4 +32,6 @@ pub const STATUS: Status<3> = Status {
     starvations: 0,
     is_ready: true,
     fault: None,
+    homing: HomingProgress::None,
+    homed: [None; 3],
 };

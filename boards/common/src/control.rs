@@ -6,12 +6,12 @@
 use motion_kernel::exec::ExecState;
 use motion_kernel::fault::{Fault, FaultKind};
 use motion_kernel::flight::FlightRecorder;
-use motion_kernel::hal::{DriveEnable, Encoder, Inputs, OutputState, Outputs, VelocityChannel};
+use motion_kernel::hal::{DriveEnable, Encoder, IndexLatch, Inputs, OutputState, Outputs, VelocityChannel};
 use motion_kernel::kernel::Kernel;
 use motion_kernel::num::Real;
 use motion_kernel::queue::Intake;
 use motion_kernel::scope::{Noting, Recorder};
-use motion_kernel::units::Position;
+use motion_kernel::units::{Counts, Position};
 
 use crate::tick_timing::TickTiming;
 
@@ -31,6 +31,22 @@ pub struct Control<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTE
     due: Option<OutputState>,
     /// Spindle or coolant may be on.
     is_switched: bool,
+    index: Index,
+}
+
+/// An axis' index latch, on its way between background and tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Index {
+    /// Nobody asks for it.
+    Unused,
+    /// The next tick is to arm that of this axis.
+    Due(usize),
+    /// That of this axis has taken nothing yet.
+    Armed(usize),
+    /// It has taken this count.
+    Latched(Counts),
+    /// There is none, or it failed.
+    Missing,
 }
 
 /// The tick's last results.
@@ -55,7 +71,17 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
     ) -> Self {
         let timing = TickTiming::new();
         let (recorder, is_healthy, is_switched) = (None, false, false);
-        Self { kernel, intake, timing, flight, recorder, is_healthy, due: None, is_switched }
+        Self {
+            kernel,
+            intake,
+            timing,
+            flight,
+            recorder,
+            is_healthy,
+            due: None,
+            is_switched,
+            index: Index::Unused,
+        }
     }
 
     /// From now on `recorder` is told every tick: the tick's part of a [scope](motion_kernel::scope::ScopeMemory).
@@ -69,11 +95,14 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
     #[inline]
     pub fn tick<H>(&mut self, unhealthy: Option<FaultKind<R>>, late: Option<FaultKind<R>>, hal: &mut H)
     where
-        H: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES> + Outputs,
+        H: Encoder<AXES> + Inputs<AXES> + VelocityChannel<AXES> + DriveEnable<AXES> + Outputs + IndexLatch,
     {
         self.is_healthy = unhealthy.is_none();
         for kind in unhealthy.into_iter().chain(late) {
             self.trip(kind);
+        }
+        if let Index::Due(axis) = self.index {
+            self.index = hal.arm(axis).map_or(Index::Missing, |()| Index::Armed(axis));
         }
         let mut noting = Noting::new(hal);
         let trace = self.kernel.tick(&mut self.intake, &mut noting);
@@ -88,6 +117,28 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
             hal.switch(&to);
             self.is_switched = to != OutputState::OFF;
         }
+        if let Index::Armed(axis) = self.index {
+            self.index = match hal.latched(axis) {
+                Ok(None) => self.index,
+                Ok(Some(counts)) => Index::Latched(counts),
+                Err(_) => Index::Missing,
+            };
+        }
+    }
+
+    /// Has the next tick arm an axis' index latch, and every tick look at it from then on.
+    pub(crate) fn arm_index(&mut self, axis: usize) {
+        self.index = Index::Due(axis);
+    }
+
+    /// What has become of it.
+    pub(crate) fn index(&self) -> Index {
+        self.index
+    }
+
+    /// Nobody asks for an index any more.
+    pub(crate) fn forget_index(&mut self) {
+        self.index = Index::Unused;
     }
 
     /// Switches spindle and coolant in the next tick, unless that finds a fault.

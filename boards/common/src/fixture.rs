@@ -2,8 +2,10 @@
 
 use core::convert::Infallible;
 
+use hal_sim::SimHome;
 use motion_kernel::hal::{
-    BoardOutputs, DriveEnable, Encoder, Inputs, MachineInputs, OutputState, Outputs, VelocityChannel,
+    BoardOutputs, DriveEnable, Encoder, IndexLatch, Inputs, MachineInputs, OutputState, Outputs,
+    VelocityChannel,
 };
 use motion_kernel::link::{Build, Identity};
 use motion_kernel::live::Leads;
@@ -59,6 +61,9 @@ pub(crate) fn end() -> [Position; AXES] {
 pub(crate) struct IdealDrives {
     counts: [f64; AXES],
     counts_per_code: [f64; AXES],
+    mm_per_count: [f64; AXES],
+    /// Home switches and index latches; the first axis has no latch.
+    pub(crate) homes: [Option<SimHome>; AXES],
     pub(crate) is_enabled: bool,
     pub(crate) now: u32,
     /// Ticks in which outputs were switched.
@@ -74,14 +79,40 @@ impl Outputs for IdealDrives {
 impl Encoder<AXES> for IdealDrives {
     type Error = Infallible;
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
-        Ok(self.counts.map(|counts| Counts(counts.round() as i64)))
+        let counts = self.counts.map(|counts| Counts(counts.round() as i64));
+        for ((home, mm_per_count), counts) in self.homes.iter_mut().zip(self.mm_per_count).zip(counts) {
+            if let Some(home) = home {
+                home.advance(counts.0 as f64 * mm_per_count, counts);
+            }
+        }
+        Ok(counts)
+    }
+}
+
+/// There is no index latch.
+#[derive(Debug)]
+pub(crate) struct NoIndex;
+
+impl IndexLatch for IdealDrives {
+    type Error = NoIndex;
+    fn arm(&mut self, axis: usize) -> Result<(), NoIndex> {
+        let home = self.homes.get_mut(axis).and_then(Option::as_mut).filter(|_| axis != 0).ok_or(NoIndex)?;
+        home.arm();
+        Ok(())
+    }
+    fn latched(&mut self, axis: usize) -> Result<Option<Counts>, NoIndex> {
+        Ok(self.homes.get(axis).and_then(|home| home.as_ref()?.latched()))
     }
 }
 
 impl Inputs<AXES> for IdealDrives {
     type Error = Infallible;
     fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
-        Ok(MachineInputs::HEALTHY)
+        let mut inputs = MachineInputs::HEALTHY;
+        for (axis, home) in inputs.axes.iter_mut().zip(&self.homes) {
+            *axis = axis.with_home(home.as_ref().is_some_and(SimHome::is_closed));
+        }
+        Ok(inputs)
     }
 }
 
@@ -113,7 +144,15 @@ impl IdealDrives {
             let mm_s_per_code = axis.mm_s_at_10_v / f64::from(DacCode::from_volts(10.0_f64).0);
             mm_s_per_code * BOARD.tick_s() / axis.mm_per_count
         });
-        Self { counts: [0.0; AXES], counts_per_code, is_enabled: false, now: 0, switched: Vec::new() }
+        Self {
+            counts: [0.0; AXES],
+            counts_per_code,
+            mm_per_count: machine().header().axes.map(|axis| axis.mm_per_count),
+            homes: [const { None }; AXES],
+            is_enabled: false,
+            now: 0,
+            switched: Vec::new(),
+        }
     }
 }
 

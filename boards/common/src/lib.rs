@@ -42,6 +42,7 @@ pub mod machine;
 pub mod runs;
 pub mod streamed;
 pub mod linked;
+mod homing;
 pub mod stored;
 pub mod panel;
 pub mod console;

@@ -10,9 +10,15 @@
 use core::convert::Infallible;
 
 use motion_kernel::exec::ExecState;
+use motion_kernel::fault::{Fault, FaultKind};
+use motion_kernel::flight::frame_max;
 use motion_kernel::hal::OutputState;
+use motion_kernel::homing::{HomingFigures, HomingInput, HomingStep};
+use motion_kernel::jog::Jog;
 use motion_kernel::law::Pulse;
-use motion_kernel::link::{BoardLink, Came, ParameterBuffer, State as MachineState, Status, WriteError};
+use motion_kernel::link::{
+    BoardLink, Came, HomingFailure, ParameterBuffer, State as MachineState, Status, WriteError,
+};
 use motion_kernel::live::State;
 use motion_kernel::num::Real;
 use motion_kernel::program::SupplyError;
@@ -20,7 +26,8 @@ use motion_kernel::queue::LiveFeeder;
 use motion_kernel::scope::{BODY_MAX, BoardScope, Command, Log};
 use rtic_core::Mutex;
 
-use crate::control::Control;
+use crate::control::{Control, Index};
+use crate::homing::BoardHoming;
 use crate::log::LogLine;
 use crate::machine::Machine;
 use crate::parameters::BoardParameters;
@@ -29,9 +36,11 @@ use crate::streamed::{Requests, Streamed};
 
 /// Time between two messages about the machine \[ms\].
 const STATUS_MS: u32 = 20;
+/// The longest frame of a row of the flight recorder \[bytes\].
+const FLIGHT_FRAME_MAX: usize = frame_max(9);
 
 /// The background. `ITEMS` and `PLACES` are those of [`Streamed`]; there is room for `PARAMETERS` bytes of new parameters (three
-/// axes of the reference machine take 578, nine less than 1800), none on a board that can't store them.
+/// axes of the reference machine take 578, nine less than 1800, and each that is homed less than 110 more), none on a board that can't store them.
 pub struct Linked<
     'a,
     R: Real,
@@ -59,6 +68,7 @@ pub struct Linked<
     dump: FlightDump,
     report: Report,
     scope: Option<BoardScope<'a, R, AXES>>,
+    homing: BoardHoming<AXES>,
 }
 
 impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, const PARAMETERS: usize>
@@ -87,7 +97,13 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
             dump: FlightDump::default(),
             report: Report::default(),
             scope: None,
+            homing: BoardHoming::new(&HomingFigures::NONE, pulse, board.tick_s()),
         }
+    }
+
+    /// From now on the PC may have axes homed that have figures here; without it every such command is refused.
+    pub fn set_homing(&mut self, figures: &HomingFigures<AXES>, pulse: Pulse) {
+        self.homing = BoardHoming::new(figures, pulse, self.board.tick_s());
     }
 
     /// From now on `parameters`, the present ones as a compiled program, may be read by the PC. Its items do not matter.
@@ -133,7 +149,9 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
         control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
     ) {
         let requests = self.streamed.receive(next_byte);
+        self.end_homing(requests, is_hold_asked());
         let is_given_up = self.act(requests, control);
+        self.home(control);
         // Behind what may have enabled the drives.
         self.receive_parameters(control);
         self.refused = self.streamed.plan(is_hold_asked, next_byte).err();
@@ -177,14 +195,16 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
         requests: Requests,
         control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
     ) -> bool {
-        let Self { streamed, board, to_store, .. } = self;
+        let Self { streamed, board, to_store, homing, .. } = self;
         let live = streamed.state();
+        // Homing aborts its own moves.
+        let homes = homing.running().is_some();
         // Parameters that are to be stored need the drives off.
         let may_enable = to_store.is_none();
         control.lock(|control| {
             let is_waiting = matches!(control.seen().state, ExecState::Stopped | ExecState::Dwell);
             // At a program stop, or in a dwell, there is nothing to come to rest from.
-            let is_aborted = live == State::Aborted || live == State::Aborting && is_waiting;
+            let is_aborted = !homes && (live == State::Aborted || live == State::Aborting && is_waiting);
             let tick = control.kernel.trace().tick;
             let mut note = |command: Command| {
                 if let Some(log) = streamed.log_mut() {
@@ -219,9 +239,109 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
             }
             if let Some(here) = here {
                 streamed.restart(&mut control.intake, here, tick);
+                homing.rests();
             }
             here.is_some()
         })
+    }
+
+    /// What ends homing early, or asks for it.
+    #[inline(never)]
+    fn end_homing(&mut self, requests: Requests, is_hold_asked: bool) {
+        let Self { streamed, homing, .. } = self;
+        let failure = if requests.power == Some(false) {
+            Some(HomingFailure::DrivesOff)
+        } else if requests.aborts || requests.holds || is_hold_asked {
+            Some(HomingFailure::Aborted)
+        } else {
+            streamed.is_silent().then_some(HomingFailure::Silent)
+        };
+        if failure.is_some_and(|failure| homing.end(failure)) {
+            streamed.abort();
+        }
+        if let Some(axes) = requests.homes {
+            homing.ask(axes);
+        }
+    }
+
+    /// Goes on with homing, a step of it.
+    #[inline(never)]
+    fn home<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+    ) {
+        let Self { streamed, homing, .. } = self;
+        let live = streamed.state();
+        control.lock(|control| {
+            if let Some(Fault { kind, .. }) = control.kernel.fault() {
+                forget_lost(&kind, homing);
+                if homing.is_under_way() {
+                    homing.fail(HomingFailure::Fault);
+                }
+            }
+            if !homing.is_under_way() {
+                return;
+            }
+            if control.kernel.is_off() {
+                return homing.fail(HomingFailure::DrivesOff);
+            }
+            if !control.kernel.is_on() {
+                return;
+            }
+            let tick = control.kernel.trace().tick;
+            if homing.is_asked() {
+                if matches!(live, State::Aborting | State::Aborted) {
+                    return;
+                }
+                let Some(here) = control.kernel.rest_here() else { return };
+                note(streamed, tick, Command::RestHere);
+                homing.begin_next();
+                return streamed.restart_homing(None, &mut control.intake, here, tick);
+            }
+            let Some((axis, run)) = homing.running() else { return };
+            let index = control.index();
+            if index == Index::Missing {
+                run.lacks_index();
+                control.forget_index();
+            }
+            let trace = control.kernel.trace();
+            let seen = HomingInput {
+                set: trace.executed.setpoints.each_ref().map(|setpoint| setpoint.position),
+                counts: trace.axes.get(axis).map(|axis| axis.counts).unwrap_or_default(),
+                is_home: trace.inputs.axes.get(axis).is_some_and(|axis| axis.is_home()),
+                index: if let Index::Latched(counts) = index { Some(counts) } else { None },
+                state: match live {
+                    State::Waiting if trace.executed.state != ExecState::Moving => State::Done,
+                    State::Waiting => State::Running,
+                    live => live,
+                },
+            };
+            let step = run.poll(&seen);
+            homing.tell();
+            match step {
+                Ok(HomingStep::Wait) => {}
+                Ok(HomingStep::Stop) => streamed.abort(),
+                Ok(HomingStep::ArmIndex) => control.arm_index(axis),
+                Ok(HomingStep::Move(jog)) => rest(Some(Some(jog)), streamed, control, tick),
+                Ok(HomingStep::Reference(counts, position)) => {
+                    control.forget_index();
+                    if let Some(set) = control.kernel.reference(axis, counts, position) {
+                        note(streamed, tick, Command::Reference { axis: axis as u16, counts, position });
+                        streamed.restart_homing(None, &mut control.intake, set, tick);
+                    }
+                }
+                Ok(HomingStep::Done(homed)) => {
+                    homing.found(homed);
+                    let goes_on = homing.begin_next();
+                    rest(goes_on.then_some(None), streamed, control, tick);
+                }
+                Err(error) => {
+                    control.forget_index();
+                    homing.fail(error.into());
+                    rest(None, streamed, control, tick);
+                }
+            }
+        });
     }
 
     /// Switches spindle and coolant where the program says so, and all off where it was given up.
@@ -300,18 +420,27 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
         if now_ms.wrapping_sub(self.status_ms) < STATUS_MS {
             let length = self.streamed.transmit(now_ms, None, out);
             // In the room that is left.
+            if length > 0 {
+                return length;
+            }
+            let length = self.transmit_flight(control, out);
             return if length > 0 { length } else { self.transmit_scope(control, out) };
         }
         self.status_ms = now_ms;
         let (live, starvations) = (self.streamed.state(), self.streamed.starvations());
         // Before the position: a piece that is driven meanwhile is told as the one under way.
         let driven = self.streamed.driven();
+        let (progress, homed) = (self.homing.progress, self.homing.homed);
+        let homes = self.homing.is_under_way();
         let status = control.lock(|control| {
             let (trace, is_off) = (control.kernel.trace(), control.kernel.is_off());
             Status {
                 // Counts wrap.
                 tick: trace.tick as u32,
-                state: machine_state(is_off, live, trace.executed.state),
+                state: match machine_state(is_off, live, trace.executed.state) {
+                    state if homes && state != MachineState::Off => MachineState::Homing,
+                    state => state,
+                },
                 set: trace.axes.each_ref().map(|axis| axis.set),
                 actual: trace.axes.each_ref().map(|axis| axis.actual),
                 feed_mm_s: trace.executed.motion.v_mm_s.to_f64(),
@@ -324,6 +453,8 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
                 starvations,
                 is_ready: control.is_healthy(),
                 fault: trace.fault.map(|fault| fault.to_f64()),
+                homing: progress,
+                homed,
             }
         });
         self.streamed.transmit(
@@ -336,6 +467,24 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
             }),
             out,
         )
+    }
+
+    /// The row of the flight recorder that is asked for. Before a fault there is none: its rows change with every tick.
+    #[inline(never)]
+    fn transmit_flight<const ROWS: usize, const AFTER: usize>(
+        &mut self,
+        control: &mut impl Mutex<T = Control<'a, R, AXES, ROWS, AFTER>>,
+        out: &mut [u8],
+    ) -> usize {
+        let link = self.streamed.link_mut();
+        let Some(number) = link.flight_row() else { return 0 };
+        let (rows, row) = control.lock(|control| {
+            let flight = &control.flight;
+            if flight.is_frozen() { (flight.count(), flight.row(number.into()).copied()) } else { (0, None) }
+        });
+        let mut bytes = [0; FLIGHT_FRAME_MAX];
+        let frame = row.and_then(|row| row.to_frame(&mut bytes)).unwrap_or_default();
+        link.transmit_flight(rows as u16, frame, out)
     }
 
     /// The next frame of the scope.
@@ -364,6 +513,55 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
     }
 }
 
+/// At rest between two moves of homing: begins anew there with the next one, if there is one yet, or, after homing, with what the
+/// link brings.
+fn rest<
+    'a,
+    R: Real,
+    const AXES: usize,
+    const ITEMS: usize,
+    const PLACES: usize,
+    const ROWS: usize,
+    const AFTER: usize,
+>(
+    homes: Option<Option<Jog<AXES>>>,
+    streamed: &mut Streamed<'a, R, AXES, ITEMS, PLACES>,
+    control: &mut Control<'a, R, AXES, ROWS, AFTER>,
+    tick: u64,
+) {
+    // Homing moves on at rest only.
+    let Some(here) = control.kernel.rest_here() else { return };
+    note(streamed, tick, Command::RestHere);
+    match homes {
+        Some(jog) => streamed.restart_homing(jog, &mut control.intake, here, tick),
+        None => streamed.restart(&mut control.intake, here, tick),
+    }
+}
+
+/// Tells the scope what was done to the kernel.
+fn note<R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>(
+    streamed: &mut Streamed<'_, R, AXES, ITEMS, PLACES>,
+    tick: u64,
+    command: Command,
+) {
+    if let Some(log) = streamed.log_mut() {
+        log.command(tick, command);
+    }
+}
+
+/// After these faults an axis does not know any more where it is.
+fn forget_lost<R, const AXES: usize>(kind: &FaultKind<R>, homing: &mut BoardHoming<AXES>) {
+    match *kind {
+        FaultKind::EncoderLost { axis } | FaultKind::EncoderJump { axis, .. } => {
+            if let Some(homed) = homing.homed.get_mut(axis) {
+                *homed = None;
+            }
+        }
+        FaultKind::Encoder => homing.homed = [None; AXES],
+        _ => {}
+    }
+}
+
 /// What the machine does, by its drives, live control and the tick.
 fn machine_state(is_off: bool, live: State, tick: ExecState) -> MachineState {
     match (live, tick) {
@@ -380,18 +578,21 @@ fn machine_state(is_off: bool, live: State, tick: ExecState) -> MachineState {
 
 #[cfg(test)]
 mod tests {
+    use hal_sim::{HomeParameters, IndexParameters, SimHome, SwitchParameters};
     use motion_kernel::fault::FaultKind;
-    use motion_kernel::flight::FlightRecorder;
+    use motion_kernel::flight::{FlightRecorder, FlightRow};
     use motion_kernel::hal::Spindle;
+    use motion_kernel::homing::{AxisHoming, Homed, HomingConfig};
+    use motion_kernel::jog::Direction;
     use motion_kernel::kernel::Kernel;
-    use motion_kernel::link::{Event, FRAME_MAX, HostLink, Mode};
+    use motion_kernel::link::{Event, FRAME_MAX, HomingProgress, HostLink, Mode};
     use motion_kernel::program::Item;
     use motion_kernel::queue::LiveStreams;
     use motion_kernel::units::{Counts, Position};
     use rtic_core::Exclusive;
 
     use super::*;
-    use crate::fixture::{AXES, BOARD, IdealDrives, TICK_S, end, identity, machine};
+    use crate::fixture::{AXES, BOARD, IdealDrives, Random, TICK_S, end, identity, machine};
     use crate::runs::to_start;
 
     type Host = HostLink<AXES, 64, 8192>;
@@ -421,6 +622,12 @@ mod tests {
         is_held: bool,
         /// Nothing comes from the operator any more.
         is_silent: bool,
+        /// So many frames in a thousand are cut, in both directions.
+        loses: u64,
+        random: Random,
+        /// Rows of the flight recorder that have come.
+        flight: Vec<FlightRow<f64, AXES>>,
+        flight_rows: Option<u16>,
     }
 
     impl Operator {
@@ -449,7 +656,15 @@ mod tests {
     }
 
     /// A board and an operator over a good wire, until `script` says that it is over; it is called before every tick.
-    fn board(mut script: impl FnMut(u32, &mut Operator) -> bool) -> Seen {
+    fn board(script: impl FnMut(u32, &mut Operator) -> bool) -> Seen {
+        board_with([const { None }; AXES], script)
+    }
+
+    /// The same with home switches and index pulses.
+    fn board_with(
+        homes: [Option<SimHome>; AXES],
+        mut script: impl FnMut(u32, &mut Operator) -> bool,
+    ) -> Seen {
         let machine = machine();
         let header = *machine.header();
         let mut flight = FlightRecorder::<f32, AXES, 16, 8>::new();
@@ -459,7 +674,9 @@ mod tests {
         let mut control = Control::new(kernel, intake, &mut flight);
         let link = BoardLink::new(3, identity(ITEMS));
         let mut linked = Linked::<f32, AXES, ITEMS, 64, 0>::new(&BOARD, link, feeder, header.pulse);
+        linked.set_homing(&figures(), header.pulse);
         let mut drives = IdealDrives::new();
+        drives.homes = homes;
         let mut operator = Operator {
             host: Host::new(1),
             status: None,
@@ -468,6 +685,10 @@ mod tests {
             unhealthy: None,
             is_held: false,
             is_silent: false,
+            loses: 0,
+            random: Random(7),
+            flight: Vec::new(),
+            flight_rows: None,
         };
         let (mut out, mut to_board) = ([0; FRAME_MAX], std::collections::VecDeque::new());
         let (mut states, mut lines): (Vec<(State, _)>, _) = (Vec::new(), Vec::new());
@@ -475,7 +696,22 @@ mod tests {
             if script(now, &mut operator) {
                 return Seen { states, drives, lines };
             }
-            let Operator { host, items, status, is_ready, unhealthy, is_held, is_silent } = &mut operator;
+            let Operator {
+                host,
+                items,
+                status,
+                is_ready,
+                unhealthy,
+                is_held,
+                is_silent,
+                loses,
+                random,
+                flight,
+                flight_rows,
+            } = &mut operator;
+            let mut cut = |length: usize| {
+                if random.below(1000) < *loses { random.below(length as u64 + 1) as usize } else { length }
+            };
             while let Some(item) = items.front()
                 && *is_ready
                 && host.push(item.as_ref()).expect("short")
@@ -484,14 +720,14 @@ mod tests {
             }
             let now_ms = now / 2;
             let length = if *is_silent { 0 } else { host.transmit(now_ms, &mut out) };
-            to_board.extend(out[..length].iter().copied());
+            to_board.extend(out[..cut(length)].iter().copied());
             drives.now = now;
             control.tick(*unhealthy, None, &mut drives);
             let mut control = Exclusive(&mut control);
             lines.extend(linked.line(now, 0, &mut control));
             linked.poll_unless(&|| *is_held, &mut || to_board.pop_front(), &mut control);
             let length = linked.transmit(now_ms, &mut control, &mut out);
-            host.receive(&out[..length], now_ms, &mut |event| match event {
+            host.receive(&out[..cut(length)], now_ms, &mut |event| match event {
                 Event::Status(told) => {
                     if states.last().is_none_or(|(state, _)| *state != told.state) {
                         states.push((told.state, told.set));
@@ -499,6 +735,10 @@ mod tests {
                     *status = Some(told);
                 }
                 Event::Ready { .. } => *is_ready = true,
+                Event::Flight { rows, kept, .. } => {
+                    flight.extend(kept);
+                    *flight_rows = Some(rows);
+                }
                 Event::Welcome(found) => assert_eq!(found, identity(ITEMS)),
                 other => panic!("{other:?}"),
             });
@@ -872,5 +1112,272 @@ mod tests {
             names(&seen).into_iter().filter(|state| !matches!(state, Idle | Moving)).collect();
         assert_eq!(names, [Off, Held, Stopped]);
         assert_eq!(seen.states.last().map(|(state, set)| (*state, *set)), Some((Idle, end())));
+    }
+
+    /// All axes towards lesser positions; the second one with its index.
+    fn figures() -> HomingFigures<AXES> {
+        let rules = machine().header().rules;
+        let at = |mm| Position::from_mm(mm).expect("in range");
+        let axes = core::array::from_fn(|axis| {
+            let config = HomingConfig {
+                direction: Direction::Negative,
+                fast_mm_s: 40.0,
+                slow_mm_s: 2.0,
+                travel_mm: 60.0,
+                back_off_mm: 40.0,
+                index_mm: (axis < 2).then_some(11.0),
+                position: at(-50.0),
+                park: Some(at(-45.0)),
+            };
+            let config = if axis == 0 { HomingConfig { index_mm: None, ..config } } else { config };
+            Some(AxisHoming { config, feed_mm_s: rules.feed_mm_s, limits: rules.limits })
+        });
+        HomingFigures { axes }
+    }
+
+    /// Where switches close \[mm\], and index pulses every 10 mm.
+    const CLOSES_MM: f64 = -20.0;
+
+    fn homes() -> [Option<SimHome>; AXES] {
+        machine().header().axes.map(|axis| {
+            let counts = |mm: f64| (mm / axis.mm_per_count).round() as i64;
+            let switch = SwitchParameters { closes_mm: (CLOSES_MM - 60.0, CLOSES_MM), hysteresis_mm: 0.2 };
+            let index = IndexParameters { counts: counts(10.0).abs(), at: Counts(counts(CLOSES_MM - 3.0)) };
+            let parameters = HomeParameters { switch: Some(switch), index: Some(index) };
+            Some(SimHome::new(parameters, 0.0, Counts(0)))
+        })
+    }
+
+    /// The count at which the index of an axis is.
+    fn index_counts(axis: usize) -> i64 {
+        ((CLOSES_MM - 3.0) / machine().header().axes[axis].mm_per_count).round() as i64
+    }
+
+    /// Enables, asks for `axes` to be homed with a dead man, and is over when that has ended; what it has come to, and every set position since.
+    fn homed(
+        axes: u16,
+        homes: [Option<SimHome>; AXES],
+        dead_man_ms: u16,
+        mut meanwhile: impl FnMut(u32, &mut Operator),
+    ) -> (HomingProgress, [Option<Homed>; AXES], Seen) {
+        let (mut step, mut last, mut since) = (0, None, 0);
+        let seen = board_with(homes, |now, operator| {
+            let aborts = operator.host.controls().aborts;
+            let told = operator.status.filter(|status| status.aborts == aborts);
+            match step {
+                0 if told.is_some_and(|status| status.is_ready) => {
+                    assert!(operator.host.enable(true));
+                    step = 1;
+                }
+                1 if told.is_some_and(|status| status.state == State::Held) => {
+                    assert!(operator.host.home(axes, dead_man_ms));
+                    (step, since) = (2, now);
+                }
+                2 => {
+                    meanwhile(now - since, operator);
+                    if let Some(status) = told
+                        && now > since + 10
+                        && !matches!(status.homing, HomingProgress::None | HomingProgress::UnderWay { .. })
+                    {
+                        last = Some(status);
+                        (step, since) = (3, now);
+                    }
+                }
+                // What has ended stays at rest.
+                3 if now > since + 400 => {
+                    let (status, last) = (operator.status.expect("told"), last.expect("ended"));
+                    assert_eq!((status.set, status.homing), (last.set, last.homing), "it moves");
+                    return true;
+                }
+                _ => {}
+            }
+            false
+        });
+        let last = last.expect("ended");
+        (last.homing, last.homed, seen)
+    }
+
+    /// One axis after the other, each to its reference and its park position; over a wire that loses a tenth, too, to the count.
+    #[test]
+    fn axes_are_homed_one_after_the_other() {
+        let park = Position::from_mm(-45.0).expect("in range");
+        let mut clean = None;
+        for loses in [0, 100, 300] {
+            println!("loses {loses} of 1000 frames");
+            let (progress, found, seen) = homed(0b110, homes(), 3000, |_, operator| operator.loses = loses);
+            assert_eq!(progress, HomingProgress::Done);
+            let [None, Some(y), Some(z)] = found else { panic!("{found:?}") };
+            assert_eq!(y.counts, Counts(index_counts(1)));
+            assert_eq!(z.index_counts, None);
+            assert_eq!(*clean.get_or_insert(found), found);
+            let (state, set) = *seen.states.last().expect("told");
+            assert_eq!((state, [set[1], set[2]]), (State::Held, [park; 2]));
+            let names = names(&seen);
+            assert_eq!(names, [State::Off, State::Held, State::Homing, State::Held]);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_homed_is_refused_by_name() {
+        let failed = |axis, failure| HomingProgress::Failed { axis, failure };
+        let of = |axes, homes| homed(axes, homes, DEAD_MAN_MS, |_, _| {}).0;
+        assert_eq!(of(0b1000, homes()), failed(3, HomingFailure::NoSettings));
+        assert_eq!(of(0, homes()), failed(0, HomingFailure::NoSettings));
+        assert_eq!(of(0b100, [const { None }; AXES]), failed(2, HomingFailure::NoSwitch { travel_mm: 60.0 }));
+        // Where the switch is and no input for the index.
+        let none = [None, None, homes()[2].clone()];
+        assert_eq!(of(0b110, none), failed(1, HomingFailure::NoSwitch { travel_mm: 60.0 }));
+    }
+
+    /// Whatever ends homing, at any time, ends it at rest and by its name; the axes before stay homed.
+    #[test]
+    fn what_ends_homing_early_is_named() {
+        for at in [1, 300, 900, 2000, 3500, 5000] {
+            println!("after {at} ticks");
+            let ended = |does: &mut dyn FnMut(u32, &mut Operator)| {
+                let (progress, _, seen) =
+                    homed(0b11, homes(), DEAD_MAN_MS, |ticks, operator| does(ticks, operator));
+                let HomingProgress::Failed { failure, .. } = progress else { panic!("{progress:?}") };
+                (failure, seen.states.last().map(|&(state, _)| state))
+            };
+            let aborts = ended(&mut |ticks, operator| {
+                if ticks == at {
+                    assert!(operator.host.abort());
+                }
+            });
+            assert_eq!(aborts, (HomingFailure::Aborted, Some(State::Held)));
+            let holds = ended(&mut |ticks, operator| {
+                if ticks == at {
+                    assert!(operator.host.press(Mode::Hold));
+                }
+            });
+            assert_eq!(holds, (HomingFailure::Aborted, Some(State::Held)));
+            let button = ended(&mut |ticks, operator| operator.is_held = ticks >= at);
+            assert_eq!(button, (HomingFailure::Aborted, Some(State::Held)));
+            // Back long after the time.
+            let silent = ended(&mut |ticks, operator| operator.is_silent = (at..at + 2000).contains(&ticks));
+            assert_eq!(silent, (HomingFailure::Silent, Some(State::Held)));
+            let off = ended(&mut |ticks, operator| {
+                if ticks == at {
+                    assert!(operator.host.enable(false));
+                }
+            });
+            assert_eq!(off, (HomingFailure::DrivesOff, Some(State::Off)));
+            let fault = ended(&mut |ticks, operator| {
+                operator.unhealthy = (ticks >= at).then_some(FaultKind::EmergencyStop);
+            });
+            assert_eq!(fault, (HomingFailure::Fault, Some(State::Off)));
+        }
+    }
+
+    /// An axis whose encoder was lost is not homed any more; the others are, also with the drives off in between.
+    #[test]
+    fn a_lost_encoder_is_not_homed() {
+        let mut step = 0;
+        let mut since = 0;
+        board_with(homes(), |now, operator| {
+            let aborts = operator.host.controls().aborts;
+            let Some(status) = operator.status.filter(|status| status.aborts == aborts) else { return false };
+            let is_homed = status.homed.map(|homed| homed.is_some());
+            match step {
+                0 => {
+                    assert!(operator.host.enable(true));
+                    step = 1;
+                }
+                1 if status.state == State::Held => {
+                    assert!(operator.host.home(0b11, DEAD_MAN_MS));
+                    step = 2;
+                }
+                2 if status.homing == HomingProgress::Done => {
+                    assert_eq!(is_homed, [true, true, false]);
+                    operator.unhealthy = Some(FaultKind::EncoderLost { axis: 1 });
+                    (step, since) = (3, now);
+                }
+                3 if now > since + 500 => {
+                    assert_eq!(is_homed, [true, false, false]);
+                    operator.unhealthy = None;
+                    assert!(operator.host.clear_fault() && operator.host.enable(true));
+                    (step, since) = (4, now);
+                }
+                4 if now > since + 1000 => {
+                    assert_eq!((is_homed, status.state), ([true, false, false], State::Held));
+                    step = 5;
+                }
+                _ => {}
+            }
+            step == 5
+        });
+    }
+
+    /// Nothing before a fault; then every row once and in order, however many frames are lost; nothing after the fault is cleared.
+    #[test]
+    fn the_flight_recorder_is_read() {
+        for loses in [0, 300] {
+            let (mut step, mut since) = (0, 0);
+            board(|now, operator| {
+                match step {
+                    0 if operator.status.is_some() => {
+                        operator.loses = loses;
+                        operator.host.read_flight(0);
+                        step = 1;
+                    }
+                    1 if operator.flight_rows.take() == Some(0) => {
+                        assert!(operator.flight.is_empty());
+                        operator.unhealthy = Some(FaultKind::EmergencyStop);
+                        (step, since) = (2, now);
+                    }
+                    2 if now > since + 100 => {
+                        operator.host.read_flight(0);
+                        step = 3;
+                    }
+                    3 if operator.flight_rows.take().is_some() => {
+                        let count = operator.flight.len();
+                        if count < 16 {
+                            operator.host.read_flight(count as u16);
+                            return false;
+                        }
+                        let first = operator.flight[0].tick;
+                        let ticks: Vec<u64> = operator.flight.iter().map(|row| row.tick).collect();
+                        assert_eq!(ticks, (first..first + 16).collect::<Vec<_>>());
+                        // Eight of them behind the fault's.
+                        let faulted = operator.flight.iter().position(|row| row.is_faulted);
+                        assert_eq!((faulted, operator.flight[7].tick), (Some(7), u64::from(since) - 1));
+                        operator.unhealthy = None;
+                        operator.flight.clear();
+                        assert!(operator.host.clear_fault());
+                        (step, since) = (4, now);
+                    }
+                    4 if now > since + 2000 => {
+                        operator.host.read_flight(0);
+                        step = 5;
+                    }
+                    5 if operator.flight_rows == Some(0) => return operator.flight.is_empty(),
+                    _ => {}
+                }
+                false
+            });
+        }
+    }
+
+    /// Somebody else asks while a key is pressed: the board holds at once, though the other one is not silent.
+    #[test]
+    fn another_asker_holds_what_has_a_dead_man() {
+        let (mut step, mut held) = (0, None);
+        board(|now, operator| {
+            if now < 2600 {
+                let before = step;
+                drive(&mut step, operator);
+                if (before, step) == (1, 2) {
+                    assert!(operator.host.control(|controls| controls.dead_man_ms = DEAD_MAN_MS));
+                }
+            } else if now == 2600 {
+                (operator.host, operator.status) = (Host::new(77), None);
+                operator.items.clear();
+            } else if operator.state() == Some(State::Held) {
+                held.get_or_insert(now);
+            }
+            now == 5000
+        });
+        assert!(held.is_some());
     }
 }

@@ -8,6 +8,7 @@
 
 use motion_kernel::axis::{AxesConfig, AxesError};
 use motion_kernel::hal::{BoardOutputs, OutputState, Spindle};
+use motion_kernel::homing::HomingFigures;
 use motion_kernel::num::Real;
 use motion_kernel::program::{CheckError, Header, Item, ProgramError, Reader, check_live, switches_as_stops};
 
@@ -69,6 +70,8 @@ pub struct Machine<'a, R: Real, const AXES: usize> {
     pub program: Reader<'a, AXES>,
     /// The kernel's axes.
     pub axes: AxesConfig<R, AXES>,
+    /// How they are homed.
+    pub homing: HomingFigures<AXES>,
 }
 
 impl<'a, R: Real, const AXES: usize> Machine<'a, R, AXES> {
@@ -110,7 +113,8 @@ impl<'a, R: Real, const AXES: usize> Machine<'a, R, AXES> {
         let guards = program.guards().map_err(MachineError::Program)?.ok_or(MachineError::Unguarded)?;
         let axes = AxesConfig::new(axes, expected).and_then(|axes| axes.guarded(&guards, expected));
         let axes = axes.map_err(MachineError::Axes)?;
-        Ok(Self { program, axes })
+        let homing = program.homing().map_err(MachineError::Program)?;
+        Ok(Self { program, axes, homing })
     }
 
     /// The program's header: what it was planned for.

@@ -6,13 +6,15 @@
 
 use core::cell::RefCell;
 use core::convert::Infallible;
+use core::task::Poll;
 
 use motion_kernel::hal::OutputState;
+use motion_kernel::jog::Jog;
 use motion_kernel::law::Pulse;
 use motion_kernel::link::{BoardLink, Came, Controls, ItemQueue, Mode, Status};
 use motion_kernel::live::{Leads, LiveControl, State};
 use motion_kernel::num::Real;
-use motion_kernel::program::{SupplyError, Switching};
+use motion_kernel::program::{Item, Source, SupplyError, Switching};
 use motion_kernel::queue::{Intake, LiveFeeder};
 use motion_kernel::scope::Log;
 use motion_kernel::units::Position;
@@ -29,6 +31,35 @@ pub struct Requests {
     pub clears_fault: bool,
     /// The operator resumes: also from a program stop, which is the kernel's.
     pub resumes: bool,
+    /// The operator holds.
+    pub holds: bool,
+    /// The operator gives up what is under way.
+    pub aborts: bool,
+    /// The operator has these axes homed, the lowest bit is the first one's; what was under way is given up.
+    pub homes: Option<u16>,
+}
+
+/// Where items come from: over the link, or of a move of homing.
+struct Items<const AXES: usize, const ITEMS: usize> {
+    queue: ItemQueue<AXES, ITEMS>,
+    /// Nothing is taken from the queue.
+    is_homing: bool,
+    /// What is left of the move.
+    jog: Option<Jog<AXES>>,
+}
+
+impl<const AXES: usize, const ITEMS: usize> Source<AXES> for Items<AXES, ITEMS> {
+    type Error = Infallible;
+
+    fn poll_next(&mut self) -> Poll<Option<Result<Item<AXES>, Infallible>>> {
+        if !self.is_homing {
+            return self.queue.poll_next();
+        }
+        match self.jog.as_mut().and_then(Iterator::next) {
+            Some(item) => Poll::Ready(Some(item)),
+            None => Poll::Pending,
+        }
+    }
 }
 
 /// A program that comes over the link. `ITEMS` have room before they are taken into the streams; `PLACES` is that of
@@ -42,7 +73,7 @@ pub struct Streamed<'a, R: Real, const AXES: usize, const ITEMS: usize, const PL
 
 /// Live control of items that come over the link.
 type Live<R, const AXES: usize, const ITEMS: usize, const PLACES: usize> =
-    LiveControl<R, AXES, Switching<ItemQueue<AXES, ITEMS>>, Infallible, PLACES>;
+    LiveControl<R, AXES, Switching<Items<AXES, ITEMS>>, Infallible, PLACES>;
 
 impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
     Streamed<'a, R, AXES, ITEMS, PLACES>
@@ -57,7 +88,8 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         tick_s: f64,
         leads: Leads,
     ) -> Self {
-        let mut control = LiveControl::new(Switching::new(ItemQueue::new()), pulse, tick_s, leads);
+        let items = Items { queue: ItemQueue::new(), is_homing: false, jog: None };
+        let mut control = LiveControl::new(Switching::new(items), pulse, tick_s, leads);
         // As the controls are before the operator's first command.
         control.hold();
         Self { link: RefCell::new(link), feeder, control, obeyed: Controls::NONE }
@@ -71,7 +103,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         let link = link.get_mut();
         for _ in 0..FRAMES_PER_POLL {
             link.receive(&mut bytes);
-            if !link.put_items(control.source_mut().items_mut()) {
+            if !link.put_items(&mut control.source_mut().items_mut().queue) {
                 break;
             }
         }
@@ -98,7 +130,8 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         let Self { link, feeder, control, .. } = self;
         let bytes = core::iter::from_fn(next_byte);
         let is_held = is_hold_asked() || link.get_mut().is_silent();
-        if is_held {
+        // Homing is aborted instead.
+        if is_held && !control.source_mut().items_mut().is_homing {
             control.hold();
         }
         let bytes = RefCell::new(bytes);
@@ -122,14 +155,47 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         // Of the program before, even if it was never put out.
         control.source_mut().switched();
         control.restart();
-        if obeyed.mode == Mode::Hold {
+        let items = control.source_mut().items_mut();
+        let was_homing = core::mem::replace(&mut items.is_homing, false);
+        items.jog = None;
+        let Came { aborts, taken, .. } = items.queue.came();
+        // After homing nothing moves before the next command.
+        if obeyed.mode == Mode::Hold || was_homing {
             control.hold();
         }
         set(obeyed, control);
         let is_restarted = feeder.restart(intake, here);
         debug_assert!(is_restarted, "both are ends of the same streams");
-        let Came { aborts, taken, .. } = control.source_mut().items_mut().came();
-        feeder.note_restart(tick, here, (aborts, taken));
+        feeder.note_restart(tick, here, Some((aborts, taken)));
+    }
+
+    /// [`Self::restart`] with a move of homing, or with none yet; items that come wait until another restart.
+    pub(crate) fn restart_homing(
+        &mut self,
+        jog: Option<Jog<AXES>>,
+        intake: &mut Intake<'_, R, AXES>,
+        here: [Position; AXES],
+        tick: u64,
+    ) {
+        let Self { feeder, control, obeyed, .. } = self;
+        control.source_mut().switched();
+        control.restart();
+        let items = control.source_mut().items_mut();
+        (items.is_homing, items.jog) = (true, jog);
+        set(obeyed, control);
+        let is_restarted = feeder.restart(intake, here);
+        debug_assert!(is_restarted, "both are ends of the same streams");
+        feeder.note_restart(tick, here, None);
+    }
+
+    /// Comes to rest, and gives up what is under way.
+    pub(crate) fn abort(&mut self) {
+        self.control.abort();
+    }
+
+    /// Whether who asked last says nothing any more, for the time that the controls tell.
+    pub(crate) fn is_silent(&mut self) -> bool {
+        self.link.get_mut().is_silent()
     }
 
     /// Writes the next frame for the PC to `out`; see [`BoardLink::transmit`]. `status` is asked for the machine's status with
@@ -140,7 +206,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>
         status: Option<&dyn Fn(Came) -> Status<AXES>>,
         out: &mut [u8],
     ) -> usize {
-        let items = self.control.source_mut().items_mut();
+        let items = &self.control.source_mut().items_mut().queue;
         let status = status.map(|status| status(items.came()));
         self.link.get_mut().transmit(now_ms, items, status, out)
     }
@@ -199,10 +265,12 @@ fn obey<R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>(
     control: &mut Live<R, AXES, ITEMS, PLACES>,
 ) -> Requests {
     let before = core::mem::replace(obeyed, *controls);
-    let is_pressed = controls.presses != before.presses;
+    // Where another one has asked for a board with a dead man, the link holds without a press.
+    let is_pressed = controls.presses != before.presses || controls.mode != before.mode;
+    let is_homing = control.source_mut().items_mut().is_homing;
     if controls.aborts != before.aborts {
         control.abort();
-    } else if is_pressed {
+    } else if is_pressed && !is_homing {
         match controls.mode {
             Mode::Run => control.resume(),
             Mode::Hold => control.hold(),
@@ -213,6 +281,9 @@ fn obey<R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>(
         power: (controls.power_presses != before.power_presses).then_some(controls.is_enabled),
         clears_fault: controls.fault_resets != before.fault_resets,
         resumes: is_pressed && controls.mode == Mode::Run,
+        holds: is_pressed && controls.mode == Mode::Hold,
+        aborts: controls.aborts != before.aborts,
+        homes: (controls.homings != before.homings).then_some(controls.home_axes),
     }
 }
 
@@ -221,15 +292,18 @@ fn set<R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>(
     controls: &Controls,
     control: &mut Live<R, AXES, ITEMS, PLACES>,
 ) {
-    let set = control.set_override(f64::from(controls.override_permille) * 1e-3);
+    let is_homing = control.source_mut().items_mut().is_homing;
+    // The lengths of homing are for its feeds, or slower.
+    let most = if is_homing { 1.0 } else { f64::INFINITY };
+    let set = control.set_override((f64::from(controls.override_permille) * 1e-3).min(most));
     debug_assert!(set.is_ok(), "the link takes no other");
-    control.set_single_block(controls.is_single_block);
+    control.set_single_block(controls.is_single_block && !is_homing);
 }
 
 #[cfg(test)]
 mod tests {
     use motion_kernel::exec::{ExecState, Executor};
-    use motion_kernel::link::{Event, FRAME_MAX, HostLink, State as MachineState};
+    use motion_kernel::link::{Event, FRAME_MAX, HomingProgress, HostLink, State as MachineState};
     use motion_kernel::program::Item;
     use motion_kernel::queue::LiveStreams;
     use motion_kernel::straight::Straight;
@@ -333,6 +407,8 @@ mod tests {
                 starvations: 0,
                 is_ready: true,
                 fault: None,
+                homing: HomingProgress::None,
+                homed: [None; AXES],
             };
             let length = board.transmit(now_ms, now.is_multiple_of(40).then_some(&status), &mut out);
             let mut frame = out[..length].to_vec();

@@ -4,11 +4,17 @@
 
 use core::convert::Infallible;
 
-use hal_sim::{Ad5754Chip, ChipError, REFERENCE_LINE, SimMachine};
+use hal_sim::{
+    Ad5754Chip, ChipError, HomeParameters, IndexParameters, REFERENCE_LINE, SimHome, SimMachine,
+    SwitchParameters,
+};
 use motion_kernel::hal::{
-    Ad5754Error, Ad5754Output, DriveEnable, Encoder, Inputs, MachineInputs, OutputState, Outputs,
+    Ad5754Error, Ad5754Output, DriveEnable, Encoder, IndexLatch, Inputs, MachineInputs, OutputState, Outputs,
     VelocityChannel,
 };
+use motion_kernel::homing::HomingFigures;
+use motion_kernel::jog::Direction;
+use motion_kernel::program::Header;
 use motion_kernel::units::{Counts, DacCode};
 
 use crate::AXES;
@@ -20,6 +26,7 @@ pub type Simulated = SimMachine<AXES, REFERENCE_LINE>;
 pub struct Hardware {
     machine: &'static Simulated,
     outputs: Ad5754Output<&'static Ad5754Chip, AXES>,
+    homes: [Option<SimHome>; AXES],
     /// Spindle and coolant as they were switched last.
     pub switched: OutputState,
 }
@@ -31,7 +38,29 @@ impl Hardware {
     /// The converter does not take its configuration.
     pub fn new(machine: &'static Simulated) -> Result<Self, Ad5754Error<ChipError>> {
         let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip())?;
-        Ok(Self { machine, outputs, switched: OutputState::OFF })
+        Ok(Self { machine, outputs, homes: [const { None }; AXES], switched: OutputState::OFF })
+    }
+
+    /// Gives every axis that is homed a switch, and an index where it looks for one: the switch is closed from a third of the
+    /// search's length on, an index follows after half of the length within which it is looked for.
+    pub fn add_homes(&mut self, header: &Header<AXES>, homing: &HomingFigures<AXES>, counts: [Counts; AXES]) {
+        let truth = self.machine.truth();
+        for (((home, axis), figures), (truth, counts)) in
+            self.homes.iter_mut().zip(&header.axes).zip(&homing.axes).zip(truth.iter().zip(counts))
+        {
+            let Some(config) = figures.as_ref().map(|figures| &figures.config) else { continue };
+            let sign = if config.direction == Direction::Positive { 1.0 } else { -1.0 };
+            let near_mm = truth.position_mm + sign * config.travel_mm / 3.0;
+            let far_mm = near_mm + sign * config.back_off_mm;
+            let index = config.index_mm.map(|index_mm| {
+                let counts_of = |mm: f64| (mm / axis.mm_per_count) as i64;
+                let at = Counts(counts.0 + counts_of(near_mm + sign * index_mm / 2.0 - truth.position_mm));
+                IndexParameters { counts: counts_of(index_mm).abs().max(1), at }
+            });
+            let closes_mm = if sign > 0.0 { (near_mm, far_mm) } else { (far_mm, near_mm) };
+            let switch = Some(SwitchParameters { closes_mm, hysteresis_mm: 0.2 });
+            *home = Some(SimHome::new(HomeParameters { switch, index }, truth.position_mm, counts));
+        }
     }
 
     /// Lets the machine move for a tick.
@@ -44,7 +73,16 @@ impl Encoder<AXES> for Hardware {
     type Error = Infallible;
 
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
-        self.machine.latch()
+        let Ok(counts) = self.machine.latch();
+        if self.homes.iter().any(Option::is_some) {
+            let truth = self.machine.truth();
+            for ((home, truth), counts) in self.homes.iter_mut().zip(truth).zip(counts) {
+                if let Some(home) = home {
+                    home.advance(truth.position_mm, counts);
+                }
+            }
+        }
+        Ok(counts)
     }
 }
 
@@ -52,7 +90,28 @@ impl Inputs<AXES> for Hardware {
     type Error = Infallible;
 
     fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
-        self.machine.read_inputs()
+        let Ok(mut inputs) = self.machine.read_inputs();
+        for (axis, home) in inputs.axes.iter_mut().zip(&self.homes) {
+            if let Some(home) = home {
+                *axis = axis.with_home(home.is_closed());
+            }
+        }
+        Ok(inputs)
+    }
+}
+
+impl IndexLatch for Hardware {
+    type Error = Infallible;
+
+    fn arm(&mut self, axis: usize) -> Result<(), Infallible> {
+        if let Some(Some(home)) = self.homes.get_mut(axis) {
+            home.arm();
+        }
+        Ok(())
+    }
+
+    fn latched(&mut self, axis: usize) -> Result<Option<Counts>, Infallible> {
+        Ok(self.homes.get(axis).and_then(|home| home.as_ref()?.latched()))
     }
 }
 

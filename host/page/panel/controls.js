@@ -8,7 +8,7 @@ const KEEP_MS = 100;
 const FAR = 1000;
 
 /** Keys as LinuxCNC's operators know them. */
-const COMMANDS = { r: "start", p: "hold", s: "resume", Escape: "abort", t: "single_block", F2: "drives" };
+const COMMANDS = { r: "start", p: "hold", s: "resume", Escape: "abort", t: "single_block", F2: "drives", Home: "home" };
 const JOGS = { ArrowLeft: ["X", "-"], ArrowRight: ["X", "+"], ArrowDown: ["Y", "-"], ArrowUp: ["Y", "+"], PageDown: ["Z", "-"], PageUp: ["Z", "+"] };
 const OVERRIDES = "`1234567890";
 
@@ -94,6 +94,9 @@ export class Controls {
       button.addEventListener("contextmenu", (event) => event.preventDefault());
       return button;
     })));
+    const homed = board.axes.filter(({ has_homing }) => has_homing);
+    this.root.querySelector(".home").hidden = homed.length === 0;
+    this.field("home_axis").replaceChildren(...homed.map(({ name }) => new Option(name)));
     this.tellFeed();
   }
 
@@ -108,13 +111,15 @@ export class Controls {
       clear_fault: state.fault !== null,
       start: isFree && !isOff && state.program !== null,
       resume: state.under_way !== "nothing" && (state.state === "held" || state.state === "program stop"),
+      home: isFree && !isOff,
+      home_all: isFree && !isOff,
       hold: true,
       abort: true,
       capture: true,
     };
     for (const [what, is] of Object.entries(may)) this.field(what, "do").disabled = !is;
     // A button that is switched off while it is down tells nobody of its release.
-    const mayJog = !isOff && state.under_way !== "program";
+    const mayJog = !isOff && state.under_way !== "program" && state.under_way !== "homing";
     for (const button of this.root.querySelectorAll("[data-key]")) button.disabled = !mayJog && this.held === null;
     this.field("capture", "do").textContent = state.is_capturing ? "Waiting: capture anew" : "Capture";
     this.field("single_block", "do").checked = state.is_single_block;
@@ -145,6 +150,12 @@ export class Controls {
       case "drives_off": this.say("drives", { are_on: false }); return;
       case "drives": this.say("drives", { are_on: this.state?.state === "drives off" }); return;
       case "single_block": this.say("single_block", { is_on: !this.state?.is_single_block }); return;
+      case "home": {
+        const axis = this.field("home_axis").value;
+        if (axis) this.say("home", { axis });
+        return;
+      }
+      case "home_all": this.say("home"); return;
       case "capture": {
         const trigger = this.field("trigger").value.trim();
         const number = (name) => Math.max(0, Math.round(Number(this.field(name).value) || 0));
@@ -164,7 +175,7 @@ export class Controls {
     // With a modifier a key is another one, and some of them are never told to be up again.
     if (event.ctrlKey || event.altKey || event.metaKey) {
       this.release(this.held);
-      return;
+      if (key !== "Home" || !event.ctrlKey || event.altKey || event.metaKey || event.repeat) return;
     }
     const isText = target.closest?.("input[type=text],input[type=number],textarea");
     const command = COMMANDS[key.length === 1 ? key.toLowerCase() : key];
@@ -178,7 +189,7 @@ export class Controls {
     if (jog) {
       if (!event.repeat && this.board?.axes.some(({ name }) => name === jog[0])) this.press(...jog, code);
     } else if (command) {
-      if (!event.repeat) this.act(command);
+      if (!event.repeat) this.act(event.ctrlKey ? "home_all" : command);
     } else if (override >= 0) this.setOverride(10 * override);
     else return;
     event.preventDefault();

@@ -31,7 +31,7 @@ export class Display {
       const head = row.appendChild(document.createElement("th"));
       head.scope = "row";
       head.textContent = name;
-      return { row, set: row.appendChild(document.createElement("td")), error: row.appendChild(document.createElement("td")) };
+      return { row, head, set: row.appendChild(document.createElement("td")), error: row.appendChild(document.createElement("td")) };
     });
     body.replaceChildren(...this.rows.map(({ row }) => row));
   }
@@ -49,14 +49,15 @@ export class Display {
     this.root.dataset.fault = String(state.fault !== null);
     const isResting = state.under_way === "nothing" && state.state === "held";
     this.set("state", state.is_lost ? "board lost" : isResting && !state.is_foreign ? "ready" : state.state ?? "connecting");
-    const detail = { nothing: "", program: "the program", jog: "a jog" }[state.under_way];
+    const detail = { nothing: "", program: "the program", jog: "a jog", homing: `axis ${state.homing ?? ""}` }[state.under_way];
     const foreign = "a program that was not begun here: Abort gives it up";
     this.set("detail", !state.is_ready ? "inputs do not allow the drives to be on" : state.is_foreign ? foreign : detail);
     const fault = this.fields.get("fault");
     fault.hidden = state.fault === null;
     this.set("fault", state.fault === null ? "" : `Fault: ${state.fault}`);
-    this.rows.forEach(({ set, error }, i) => {
-      const { unit } = this.board.axes[i];
+    this.rows.forEach(({ head, set, error }, i) => {
+      const { unit, name, has_homing } = this.board.axes[i];
+      head.textContent = !has_homing ? name : `${name} ${state.homed[i] ? "homed" : "not homed"}`;
       const [wanted, actual] = [state.set_mm[i], state.actual_mm[i]];
       if (wanted === undefined) return;
       set.textContent = `${fixed(wanted, 3)} ${unit}`;

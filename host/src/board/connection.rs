@@ -314,6 +314,11 @@ impl<const N: usize> Connection<N> {
         self.link.read_parameters(offset);
     }
 
+    /// Asks for a row of the flight recorder; see [`HostLink::read_flight`].
+    pub fn read_flight(&mut self, row: u16) {
+        self.link.read_flight(row);
+    }
+
     /// Writes a piece of new parameters; see [`HostLink::write_parameters`].
     pub fn write_parameters(&mut self, parameters: &[u8], offset: u32) {
         self.link.write_parameters(parameters, offset);

@@ -3,7 +3,7 @@
 use std::io;
 
 use motion_kernel::hal::BoardOutputs;
-use motion_kernel::link::{Build, Identity, PushError, WriteError};
+use motion_kernel::link::{Build, HomingFailure, Identity, PushError, WriteError};
 use motion_kernel::program::ProgramError;
 use thiserror::Error;
 
@@ -126,6 +126,30 @@ pub enum BoardError {
     /// There is no such jog from where the machine stands.
     #[error("found a jog {0}")]
     Jog(motion_kernel::jog::JogError),
+    /// An axis is not homed.
+    #[error("axis {axis}: {failure}")]
+    NotHomed {
+        /// Its name.
+        axis: String,
+        /// Why.
+        failure: HomingFailure,
+    },
+    /// There is no such axis to home.
+    #[error("found axis {axis}, expected one of those with [axis.homing] in the machine file: {names}")]
+    NoHoming {
+        /// What was asked for.
+        axis: String,
+        /// Which there are.
+        names: String,
+    },
+    /// The flight recorder runs again.
+    #[error("found a fault that was cleared while its ticks were read, expected it to stay")]
+    FlightCleared,
+    /// The flight recorder has kept nothing.
+    #[error(
+        "found an empty flight recorder, expected a fault since the board started, or since the last one was cleared"
+    )]
+    NoFlight,
     /// The board was reset.
     #[error(
         "found a board that has started anew, expected it to go on: it had confirmed {confirmed} items{at}"
@@ -149,7 +173,7 @@ pub enum BoardError {
     #[error("found parameters on the board that can't be read: {0}")]
     NoParameters(ProgramError),
     /// Something is under way.
-    #[error("found a program or a jog under way, expected the machine to have nothing to do")]
+    #[error("found a program, a jog or homing under way, expected the machine to have nothing to do")]
     UnderWay,
     /// Nothing is under way.
     #[error("found nothing to go on with, expected a program under way")]
@@ -215,6 +239,9 @@ impl BoardError {
             | Self::Item { .. }
             | Self::Replaced
             | Self::Moves
+            | Self::NotHomed { .. }
+            | Self::FlightCleared
+            | Self::NoFlight
             | Self::NoParameters(_)
             | Self::Simulator(_)
             | Self::Scope(_)
@@ -231,6 +258,7 @@ impl BoardError {
             | Self::UnderWay
             | Self::NothingUnderWay
             | Self::NoProgram
+            | Self::NoHoming { .. }
             | Self::Override { .. }
             | Self::Key(_)
             | Self::Trigger(_)

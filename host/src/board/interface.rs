@@ -83,6 +83,13 @@ pub trait Board: Send {
     /// Releases the jog key, if one is pressed.
     fn release_key(&mut self);
 
+    /// Homes these axes one after the other, in the machine's order; without any, all that have `[axis.homing]`. A hold or an abort
+    /// ends it at rest. Where nothing is heard of this side for the dead man's time, the board ends it by itself.
+    ///
+    /// # Errors
+    /// An axis has no `[axis.homing]`, something is under way, or the board is lost, off or in a fault.
+    fn home(&mut self, axes: &[String]) -> Result<(), BoardError>;
+
     /// Has every tick told from now on: asks for the board's parameters first, which takes a moment. It is to be done before
     /// anything moves.
     ///
@@ -127,6 +134,8 @@ pub struct BoardAxis {
     pub travel_mm: Option<[f64; 2]>,
     /// Its greatest feed \[mm/s, °/s\].
     pub feed_mm_s: f64,
+    /// Whether it can be homed.
+    pub has_homing: bool,
 }
 
 /// What is under way.
@@ -140,6 +149,8 @@ pub enum UnderWay {
     Program,
     /// A jog.
     Jog,
+    /// Homing.
+    Homing,
 }
 
 /// What a board does.
@@ -170,6 +181,10 @@ pub struct BoardState {
     pub is_single_block: bool,
     /// Whether the inputs allow the drives to be on.
     pub is_ready: bool,
+    /// Whether each axis is homed.
+    pub homed: Vec<bool>,
+    /// The axis that is being homed.
+    pub homing: Option<String>,
     /// What went wrong, until it is cleared.
     pub fault: Option<String>,
     /// Stops on the path because items came too late.
@@ -226,6 +241,7 @@ pub fn state_words(state: State) -> &'static str {
         State::Starved => "waiting for items",
         State::Held => "held",
         State::Refused => "refused",
+        State::Homing => "homing",
     }
 }
 

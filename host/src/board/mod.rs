@@ -11,10 +11,12 @@
 //! - [`sender`]: drives a job, step by step;
 //! - [`stops`]: what a program says where it stops;
 //! - [`jog`]: jogs of a machine on a board;
+//! - [`home`]: homing of a machine on a board;
 //! - [`progress`]: how far a program is for sure;
 //! - [`scope`]: every tick of a board; [`trigger`]: those around a condition;
 //! - [`interface`]: a board as an operator has it; [`operated`]: one at a port;
 //! - [`parameters`]: a board's parameters, read, written and compared;
+//! - [`flight`]: the ticks that its flight recorder has kept;
 //! - [`simulator`]: a board with a simulated machine, in a thread or behind an address;
 //! - [`emulated`]: a board in an emulator;
 //! - [`error`]: what boards and wires refuse.
@@ -28,12 +30,14 @@ pub mod from_line;
 pub mod sender;
 pub mod stops;
 pub mod jog;
+pub mod home;
 pub mod progress;
 pub mod scope;
 pub mod trigger;
 pub mod interface;
 pub mod operated;
 pub mod parameters;
+pub mod flight;
 pub mod simulator;
 pub mod emulated;
 pub mod error;

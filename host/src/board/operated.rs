@@ -7,12 +7,13 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use motion_kernel::link::{Event, Mode, State};
+use motion_kernel::link::{Event, HomingProgress, Mode, State};
 use motion_kernel::num::{Fixed, Root};
 use motion_kernel::units::Position;
 
 use super::connection::{Connection, Heard};
 use super::error::BoardError;
+use super::home;
 use super::interface::{Board, BoardAxis, BoardEvent, BoardInfo, BoardState, UnderWay};
 use super::items::Source;
 use super::job::Job;
@@ -82,12 +83,13 @@ enum Work<const M: usize> {
         has_moved: bool,
         is_released: bool,
     },
+    Homing(Sender<M>),
 }
 
 impl<const M: usize> Work<M> {
     fn sender(&mut self) -> &mut Sender<M> {
         match self {
-            Self::Program(sender) | Self::Jog { sender, .. } => sender,
+            Self::Program(sender) | Self::Jog { sender, .. } | Self::Homing(sender) => sender,
         }
     }
 
@@ -95,6 +97,7 @@ impl<const M: usize> Work<M> {
         match self {
             Self::Program(_) => UnderWay::Program,
             Self::Jog { .. } => UnderWay::Jog,
+            Self::Homing(_) => UnderWay::Homing,
         }
     }
 }
@@ -176,6 +179,7 @@ impl<R: Root + Send, const N: usize, const M: usize> Operated<R, N, M> {
             unit: axis.unit().symbol(),
             travel_mm: travel[place].map(|ends| ends.map(Position::to_mm)),
             feed_mm_s: jog_axis(machine, place).feed_mm_s,
+            has_homing: machine.axes[place].homing.is_some(),
         });
         let info = BoardInfo {
             machine: machine.name.clone(),
@@ -290,6 +294,10 @@ impl<R: Root + Send, const N: usize, const M: usize> Board for Operated<R, N, M>
         let is_driven = matches!(self.work, Some(Work::Program(_)));
         let is_at_end = status.state == State::Idle && status.is_ended;
         let is_begun = controls.program != 0 && status.taken > 0 && !is_at_end;
+        let homing = match status.homing {
+            HomingProgress::UnderWay { axis, .. } => Some(name(axis.into())),
+            _ => None,
+        };
         let items = self.program.as_ref().filter(|_| is_driven).map(|program| program.job.items.len());
         BoardState {
             tick: status.tick,
@@ -300,6 +308,8 @@ impl<R: Root + Send, const N: usize, const M: usize> Board for Operated<R, N, M>
             feed_mm_s: status.feed_mm_s,
             line: status.line,
             is_ready: status.is_ready,
+            homed: status.homed.iter().take(self.axes.len()).map(Option::is_some).collect(),
+            homing,
             fault: status.fault.map(|fault| faults::told(&fault.kind, name)),
             starvations: status.starvations,
             items: items.map(|items| [(status.taken as usize).min(items), items]),
@@ -384,6 +394,8 @@ impl<R: Root + Send, const N: usize, const M: usize> Board for Operated<R, N, M>
 
     fn hold(&mut self) {
         match &mut self.work {
+            // There is nothing to go on with.
+            Some(Work::Homing(sender)) => sender.abort(&mut self.connection),
             Some(work) => work.sender().hold(&mut self.connection),
             None => {
                 // Before the greeting there is nothing to hold.
@@ -394,8 +406,8 @@ impl<R: Root + Send, const N: usize, const M: usize> Board for Operated<R, N, M>
 
     fn resume(&mut self) -> Result<(), BoardError> {
         let is_taken = match &mut self.work {
+            Some(Work::Homing(_)) | None => return Err(BoardError::NothingUnderWay),
             Some(work) => work.sender().resume(&mut self.connection),
-            None => return Err(BoardError::NothingUnderWay),
         };
         if is_taken { Ok(()) } else { Err(BoardError::Silent) }
     }
@@ -457,6 +469,17 @@ impl<R: Root + Send, const N: usize, const M: usize> Board for Operated<R, N, M>
         if let Some(Work::Jog { is_released, .. }) = &mut self.work {
             *is_released = true;
         }
+    }
+
+    fn home(&mut self, axes: &[String]) -> Result<(), BoardError> {
+        self.require_idle()?;
+        let axes = home::mask(&self.machine, axes)?;
+        let mut sender =
+            Sender::new(Arc::clone(&self.nothing), Arc::clone(&self.axes), Permissions::default())
+                .homes(axes, DEAD_MAN_MS);
+        sender.advance(&mut self.connection)?;
+        self.work = Some(Work::Homing(sender));
+        Ok(())
     }
 
     fn watch_ticks(&mut self) -> Result<(), BoardError> {

@@ -149,7 +149,7 @@ pub fn disable<const M: usize>(connection: &mut Connection<M>) -> Result<(), Boa
 }
 
 /// Listens until `on_event` has a result.
-fn until<const M: usize, T>(
+pub(super) fn until<const M: usize, T>(
     connection: &mut Connection<M>,
     mut on_event: impl FnMut(Event<M>, &mut Connection<M>) -> Result<Option<T>, BoardError>,
 ) -> Result<T, BoardError> {

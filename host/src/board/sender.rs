@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use motion_kernel::hal::{BoardOutputs, Spindle};
-use motion_kernel::link::{Event, Identity, Mode, State, Status};
+use motion_kernel::link::{Event, HomingProgress, Identity, Mode, State, Status};
 use motion_kernel::program::{FORMAT, Item};
 use motion_kernel::straight::Straight;
 
@@ -65,6 +65,8 @@ pub enum Step {
     Drives,
     /// Has the drives switched off.
     Disables,
+    /// Has axes homed.
+    Homes,
     /// Comes to rest after an abort.
     Aborts,
     /// All is driven.
@@ -94,6 +96,8 @@ pub struct Sender<const M: usize> {
     way: Vec<Item<M>>,
     /// All there is to drive is a jog, with a dead man.
     jog: Option<(WantedJog, u16)>,
+    /// All there is to do is to home axes, the lowest bit is the first one's, with a dead man.
+    homes: Option<(u16, u16)>,
     /// Items pushed of the program under way, its end among them.
     pushed: usize,
 }
@@ -126,6 +130,7 @@ impl<const M: usize> Sender<M> {
             is_held: false,
             way: Vec::new(),
             jog: None,
+            homes: None,
             pushed: 0,
         }
     }
@@ -139,6 +144,12 @@ impl<const M: usize> Sender<M> {
     #[must_use]
     pub fn jogs(self, jog: WantedJog, dead_man_ms: u16) -> Self {
         Self { jog: Some((jog, dead_man_ms)), ..self }
+    }
+
+    /// Has axes homed and does nothing else: the lowest bit is the first one's. After a silence of `dead_man_ms` the board ends it.
+    #[must_use]
+    pub fn homes(self, axes: u16, dead_man_ms: u16) -> Self {
+        Self { homes: Some((axes, dead_man_ms)), ..self }
     }
 
     /// How far it is.
@@ -213,7 +224,8 @@ impl<const M: usize> Sender<M> {
             | Event::Status(_)
             | Event::Parameters { .. }
             | Event::Written { .. }
-            | Event::Scope { .. } => Ok(()),
+            | Event::Scope { .. }
+            | Event::Flight { .. } => Ok(()),
         }
     }
 
@@ -229,6 +241,7 @@ impl<const M: usize> Sender<M> {
             // A command may have got lost, and comes again.
             return Ok(self.step);
         };
+        // What becomes of homing in a fault the board tells.
         let may_be_faulted = match self.step {
             Step::Greets => true,
             Step::Clears => self.since.elapsed() <= ENABLE,
@@ -260,6 +273,7 @@ impl<const M: usize> Sender<M> {
                 self.go(Step::Aborted);
             }
             Step::ToStart | Step::Drives => self.drive(&status, connection)?,
+            Step::Homes => self.home(&status, connection)?,
             Step::Disables if status.state == State::Off => self.go(Step::Done),
             Step::Disables
             | Step::Clears
@@ -335,6 +349,11 @@ impl<const M: usize> Sender<M> {
     /// The board is at rest and waits for a program.
     fn approach(&mut self, status: &Status<M>, connection: &mut Connection<M>) -> Result<(), BoardError> {
         (self.pushed, self.is_ended) = (0, false);
+        if let Some((axes, dead_man_ms)) = self.homes {
+            let _ = connection.command(|link| link.home(axes, dead_man_ms));
+            self.go(Step::Homes);
+            return Ok(());
+        }
         if let Some((jog, dead_man_ms)) = self.jog {
             self.way = jog
                 .on_board(status.set)
@@ -378,6 +397,20 @@ impl<const M: usize> Sender<M> {
             |item: &&Item<M>| matches!(item, Item::Line { .. } | Item::Septic { .. } | Item::EndOfStretch(_));
         let of_way = self.way.iter().filter(is_path).count() as u32;
         Some(self.job.begin.path + status.driven.saturating_sub(of_way))
+    }
+
+    /// Sees what has become of homing.
+    fn home(&mut self, status: &Status<M>, connection: &mut Connection<M>) -> Result<(), BoardError> {
+        match status.homing {
+            HomingProgress::Done => self.end(connection),
+            HomingProgress::Failed { axis, failure } => {
+                let axis = usize::from(axis);
+                let axis = self.axes.get(axis).cloned().unwrap_or_else(|| format!("axis {axis}"));
+                return Err(BoardError::NotHomed { axis, failure });
+            }
+            HomingProgress::None | HomingProgress::UnderWay { .. } => {}
+        }
+        Ok(())
     }
 
     /// Pushes items, and sees whether all are driven.
@@ -462,7 +495,7 @@ impl<const M: usize> Sender<M> {
 
     /// All is driven.
     fn end(&mut self, connection: &mut Connection<M>) {
-        if self.jog.is_some() {
+        if self.jog.is_some() || self.homes.is_some() {
             // At rest nothing is to be held.
             let _ = connection.command(|link| link.control(|controls| controls.dead_man_ms = 0));
         }

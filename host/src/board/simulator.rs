@@ -39,7 +39,7 @@ const PIECES: usize = 256;
 const SEGMENTS: usize = 16;
 const PLACES: usize = 256;
 /// Room for new parameters \[bytes\].
-const PARAMETERS: usize = 2048;
+const PARAMETERS: usize = 4096;
 /// Rows of its flight recorder, and how many of them come after a fault.
 const ROWS: usize = 64;
 const AFTER: usize = 16;
@@ -152,7 +152,9 @@ fn spawn<const N: usize>(
     let (machine, seen) = (machine.clone(), Arc::clone(&switches));
     let thread = thread::Builder::new().name("board".to_owned()).spawn(move || {
         let Ok(simulated) = simulated(&machine) else { return };
-        let Ok(hardware) = SimulatedHardware::new(&simulated) else { return };
+        let Ok(mut hardware) = SimulatedHardware::new(&simulated) else { return };
+        let Ok(counts) = hardware.latch();
+        hardware.add_homes(&machine, counts);
         let world = World { wires, wire: None, pace, switches: &seen };
         run(&machine, (session, record), (&simulated, hardware), world);
     });
@@ -224,6 +226,7 @@ fn run_once<const N: usize>(
     let mut linked =
         Box::new(Linked::<Number, N, ITEMS, PLACES, PARAMETERS>::new(board, link, feeder, header.pulse));
     linked.set_parameters(record);
+    linked.set_homing(&machine.homing, header.pulse);
     control.set_recorder(recorder);
     linked.set_scope(scope, log);
     let World { wires, wire, pace, switches } = world;

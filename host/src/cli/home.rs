@@ -1,18 +1,25 @@
-//! `motion home`: the axes of the simulated machine find their references.
+//! `motion home`: the axes of the simulated machine, or of one on a board, find their references.
 
 use std::io::{self, Write};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
+use motion_kernel::homing::HomingStage;
+use motion_kernel::num::Root;
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
 use super::outputs::Outputs;
+use super::port::{OnBoard, OptionalPort, PortArguments, dead_man_ms};
 use super::table::{self, Align};
 use super::trace::TraceArguments;
 use super::units::{InUnit, TableUnits};
 use super::{input, write_json};
-use crate::files::Files;
+use crate::board::home::{OnBoardHoming, mask};
+use crate::board::sender::{Found, Permissions};
+use crate::board::{Connection, Job};
+use crate::files::{Files, interrupt};
 use crate::machine::{Machine, on_machine};
 use crate::simulate::home::{HomeError, HomedAxis, Homes};
 use crate::simulate::job::RunInfo;
@@ -23,12 +30,17 @@ Examples:
   motion home --machine mine.toml
   motion home --machine mine.toml --trace home.csv
                                       every tick of every axis, for a spreadsheet
+  motion home --machine mine.toml --axis X --port /dev/ttyACM0 --enable
+                                      on a board; Ctrl-C ends it at rest
+
+A board homes by itself, with its own switches and index inputs, and the settings of its parameters. It ends that at rest where
+nothing comes from this command for the time of --dead-man. Times are what it tells there, some fifty times a second.
 
 JSON: list of {axis, counts, index_counts (how far the index was beyond the switch; null: the switch is the reference),
-time_s, position_mm (where the axis stands now), true_mm (the same from where it was switched on)}; of a rotary axis deg in
+time_s, position_mm (where the axis stands now), true_mm (the same from where it was switched on; null on a board)}; of a rotary axis deg in
 place of mm.
 
-Exit status: 1 if an axis was not homed, 2 if the machine file homes none; the axes before it are printed.";
+Exit status: 1 if an axis was not homed, 2 if the machine file homes none, 4 if Ctrl-C ended it; the axes before it are printed.";
 
 /// Home the axes that have [axis.homing] in the machine file, one after the other: search the switch, back
 /// off, approach.
@@ -38,6 +50,20 @@ pub struct HomeArguments {
     /// Machine file; `motion machine` prints one, with the keys of homing commented out.
     #[arg(long, value_name = "FILE")]
     machine: PathBuf,
+    /// Home this axis; may be given more than once. Without it, all. The order is that of the machine file.
+    #[arg(long = "axis", value_name = "AXIS")]
+    axes: Vec<String>,
+    #[command(flatten)]
+    port: OptionalPort,
+    /// On a board: after so long a silence of this command it comes to rest, s; 0.15 to 60.
+    #[arg(long, value_name = "S", default_value_t = 0.25, requires = "port")]
+    dead_man: f64,
+    /// On a board: switch the drives on if they are off.
+    #[arg(long, requires = "port")]
+    enable: bool,
+    /// On a board: give up what it has of a program.
+    #[arg(long, requires = "port")]
+    restart: bool,
     #[command(flatten)]
     trace: TraceArguments,
     /// Print JSON.
@@ -52,7 +78,7 @@ struct AxisJson<'a> {
     index_counts: Option<i64>,
     time_s: f64,
     position_mm: f64,
-    true_mm: f64,
+    true_mm: Option<f64>,
 }
 
 /// Homes and prints.
@@ -76,21 +102,89 @@ fn home<const N: usize>(
 ) -> Result<Outcome, CliError> {
     let name = arguments.machine.display().to_string();
     let refused = |source: HomeError| CliError::Home { machine: name.clone(), source };
-    let homes = Homes::new(machine).map_err(refused)?;
+    let homes = Homes::new(machine, &arguments.axes).map_err(refused)?;
+    if let Some(port) = arguments.port.given() {
+        if arguments.trace.trace.is_some() {
+            let found = "--trace with --port".to_owned();
+            return Err(CliError::Arguments {
+                found,
+                expected: "one of them: `motion watch --scope` traces a board",
+            });
+        }
+        let dead_man_ms = dead_man_ms(arguments.dead_man)?;
+        let (port, is_json) = (&port, arguments.json);
+        return port.on_board(machine, OnHoming { machine, arguments, port, dead_man_ms, is_json, out });
+    }
     let mut homed = Vec::new();
     let info = RunInfo::of_machine(machine);
     let (ended, ticks) = outputs.of_ticks(&info, |observe| homes.home(&mut homed, observe))?;
     // Axes already homed are written and shown, even if the next axis failed.
     let written = ticks.write(|_| info.empty_trace());
-    if arguments.json {
-        let axis = |axis| axis_json(axis, machine.tick_s);
-        let axes: Vec<InUnit<AxisJson<'_>>> = homed.iter().map(axis).collect();
-        write_json(&axes, out)?;
-    } else if !homed.is_empty() {
-        write_table(&homed, machine.tick_s, out).map_err(CliError::Output)?;
-    }
+    show(&homed, machine.tick_s, arguments.json, out)?;
     ended.map_err(refused)?;
     written.outcome(Outcome::Done)
+}
+
+/// Homing on a board.
+struct OnHoming<'a, const N: usize> {
+    machine: &'a Machine<N>,
+    arguments: &'a HomeArguments,
+    port: &'a PortArguments,
+    dead_man_ms: u16,
+    is_json: bool,
+    out: &'a mut dyn Write,
+}
+
+impl<const N: usize> OnBoard for OnHoming<'_, N> {
+    /// Homes, until Ctrl-C.
+    fn run<R: Root + Send, const M: usize>(self, mut connection: Connection<M>) -> Result<Outcome, CliError> {
+        let Self { machine, arguments, port, dead_man_ms, is_json, out } = self;
+        let axes = mask(machine, &arguments.axes).map_err(|error| port.refused(error))?;
+        let job = Arc::new(Job::<M>::new(machine, &[]));
+        let found = if arguments.restart { Found::GivenUp } else { Found::Stays };
+        let may = Permissions { enables: arguments.enable, found, ..Permissions::default() };
+        let homing = OnBoardHoming { machine, job, may, dead_man_ms };
+        let mut homed = Vec::new();
+        interrupt::hold_first();
+        let ended = homing.home(
+            axes,
+            &mut connection,
+            &mut homed,
+            &mut || interrupt::take_asked().is_some(),
+            &mut |axis, stage| {
+                if !is_json {
+                    eprintln!("{axis}: {}", stage_words(stage));
+                }
+            },
+        );
+        // Where the board is lost it comes to rest by itself.
+        let _ = connection.settle();
+        show(&homed, machine.tick_s, is_json, out)?;
+        let is_given_up = ended.map_err(|error| port.refused(error))?;
+        Ok(if is_given_up { Outcome::Aborted } else { Outcome::Done })
+    }
+}
+
+fn stage_words(stage: HomingStage) -> &'static str {
+    match stage {
+        HomingStage::Search => "searches the switch",
+        HomingStage::BackOff => "backs off the switch",
+        HomingStage::Approach => "approaches the switch",
+        HomingStage::Index => "looks for the index",
+        HomingStage::Park => "goes to its park position",
+    }
+}
+
+/// Prints what was found.
+fn show(homed: &[HomedAxis], tick_s: f64, is_json: bool, out: &mut dyn Write) -> Result<(), CliError> {
+    if is_json {
+        let axes: Vec<InUnit<AxisJson<'_>>> = homed.iter().map(|axis| axis_json(axis, tick_s)).collect();
+        write_json(&axes, out)
+    } else if homed.is_empty() {
+        Ok(())
+    } else {
+        write_table(homed, tick_s, out).map_err(CliError::Output)
+    }
 }
 
 fn axis_json(axis: &HomedAxis, tick_s: f64) -> InUnit<AxisJson<'_>> {
@@ -125,7 +219,10 @@ fn write_table(homed: &[HomedAxis], tick_s: f64, out: &mut dyn Write) -> io::Res
                 axis.homed.index_counts.map_or_else(|| "-".to_owned(), |counts| counts.to_string()),
                 format!("{:.4}", axis.ticks as f64 * tick_s),
                 units.cell(format!("{:.4}", axis.position_mm), axis.unit.symbol()),
-                units.cell(format!("{:.4}", axis.true_mm), axis.unit.symbol()),
+                axis.true_mm.map_or_else(
+                    || "-".to_owned(),
+                    |true_mm| units.cell(format!("{true_mm:.4}"), axis.unit.symbol()),
+                ),
             ]
         })
         .collect();

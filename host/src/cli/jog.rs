@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::error::{CliError, Outcome};
 use super::outputs::Outputs;
-use super::port::{OnBoard, OptionalPort, PortArguments};
+use super::port::{OnBoard, OptionalPort, PortArguments, dead_man_ms};
 use super::table::{self, Align};
 use super::trace::TraceArguments;
 use super::units::{InUnit, TableUnits, feed_per_s};
@@ -73,18 +73,6 @@ pub struct JogArguments {
     /// Print JSON.
     #[arg(long)]
     json: bool,
-}
-
-impl JogArguments {
-    /// The time of the dead man \[ms\].
-    fn dead_man_ms(&self) -> Result<u16, CliError> {
-        // A PC that has nothing else to say says something ten times a second.
-        if (0.15..=60.0).contains(&self.dead_man) {
-            return Ok((self.dead_man * 1e3).round() as u16);
-        }
-        let found = format!("--dead-man {}", self.dead_man);
-        Err(CliError::Arguments { found, expected: "from 0.15 to 60 s" })
-    }
 }
 
 #[derive(Serialize)]
@@ -167,7 +155,7 @@ fn jog_on_board<const N: usize>(
     (port, keys): (&PortArguments, &Keys<'_, N>),
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
-    let dead_man_ms = arguments.dead_man_ms()?;
+    let dead_man_ms = dead_man_ms(arguments.dead_man)?;
     port.on_board(machine, OnKeys { machine, arguments, port, keys, dead_man_ms, out })
 }
 

@@ -120,6 +120,16 @@ impl PortArguments {
     }
 }
 
+/// The time of a dead man \[ms\], from seconds.
+pub(super) fn dead_man_ms(dead_man_s: f64) -> Result<u16, CliError> {
+    // A PC that has nothing else to say says something ten times a second.
+    if (0.15..=60.0).contains(&dead_man_s) {
+        return Ok((dead_man_s * 1e3).round() as u16);
+    }
+    let found = format!("--dead-man {dead_man_s}");
+    Err(CliError::Arguments { found, expected: "from 0.15 to 60 s" })
+}
+
 /// What a command does with a board that has answered.
 pub(super) trait OnBoard {
     /// With a board of `M` axes, whose kernel is of the number type `R`.

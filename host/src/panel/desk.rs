@@ -316,6 +316,9 @@ impl Session {
                 self.board.press_key(&press, feed_mm_s).map_err(|error| words(&error))?;
                 self.key = is_held.then(Instant::now);
             }
+            Command::Home { axis } => {
+                self.board.home(axis.as_slice()).map_err(|error| words(&error))?;
+            }
             Command::Keep => {
                 if let Some(kept) = &mut self.key {
                     *kept = Instant::now();
@@ -331,7 +334,11 @@ impl Session {
     }
 
     fn happened(&mut self, event: BoardEvent) {
-        let what = |under_way: UnderWay| if under_way == UnderWay::Jog { "jog" } else { "program" };
+        let what = |under_way: UnderWay| match under_way {
+            UnderWay::Jog => "jog",
+            UnderWay::Homing => "homing",
+            UnderWay::Program | UnderWay::Nothing => "program",
+        };
         let (text, is_failure) = match event {
             BoardEvent::Lost(cause) => {
                 (format!("lost the board: {cause}; it comes to rest on the path"), true)
@@ -361,6 +368,8 @@ impl Session {
             BoardEvent::Stopped(text) => (text, false),
             BoardEvent::Done(UnderWay::Program) => ("the program is done".to_owned(), false),
             BoardEvent::Aborted(UnderWay::Program) => ("aborted: the rest is given up".to_owned(), false),
+            BoardEvent::Done(UnderWay::Homing) => ("homed".to_owned(), false),
+            BoardEvent::Aborted(UnderWay::Homing) => ("homing was given up".to_owned(), false),
             // A key that is released is nothing to tell.
             BoardEvent::Done(_) | BoardEvent::Aborted(_) => {
                 self.key = None;

@@ -61,6 +61,11 @@ pub enum Command {
         /// Until it is released, at the latest at the end of its distance. A key that is not held goes all of it.
         is_held: bool,
     },
+    /// Home an axis; without it, all that can be homed.
+    Home {
+        /// Its name.
+        axis: Option<String>,
+    },
     /// The key is still held: to be said again before [`KEY_SILENCE`](super::desk::KEY_SILENCE) has passed.
     Keep,
     /// The key is released. Any tab may.
@@ -95,7 +100,14 @@ impl Command {
     /// Whether something may move by it: it is not to come late.
     #[must_use]
     pub fn may_move(&self) -> bool {
-        matches!(self, Self::Start | Self::Resume | Self::Press { .. } | Self::Drives { are_on: true })
+        matches!(
+            self,
+            Self::Start
+                | Self::Resume
+                | Self::Press { .. }
+                | Self::Home { .. }
+                | Self::Drives { are_on: true }
+        )
     }
 }
 

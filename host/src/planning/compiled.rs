@@ -5,9 +5,11 @@
 use core::array::from_fn;
 
 use motion_kernel::axis::Guards;
-use motion_kernel::program::{Header, Item, write};
+use motion_kernel::homing::HomingFigures;
+use motion_kernel::program::{Header, Item, write_homed};
 
 use crate::machine::Machine;
+use crate::simulate::session::homing_figures;
 
 /// Evaluates an expression with a count of axes as a constant. Of a machine with `N` places, for the counts that have so many
 /// ([`AnyMachine`](crate::machine::AnyMachine)): others are not compiled.
@@ -53,8 +55,8 @@ pub(crate) fn bytes_of<'a, const N: usize, const M: usize>(
     let items: Vec<Item<M>> = items.into_iter().map(first_axes).collect();
     let mut bytes = Vec::new();
     // Entries of nine axes fit the format.
-    write(&header_of_axes(&machine.header()), Some(&guards_of_axes(&machine.guards())), &items, &mut bytes)
-        .expect("nine axes at most");
+    let (header, guards) = (header_of_axes(&machine.header()), guards_of_axes(&machine.guards()));
+    write_homed(&header, &guards, &homing_of_axes(machine), &items, &mut bytes).expect("nine axes at most");
     bytes
 }
 
@@ -66,6 +68,11 @@ pub(crate) fn header_of_axes<const N: usize, const M: usize>(header: &Header<N>)
 
 fn guards_of_axes<const N: usize, const M: usize>(guards: &Guards<N>) -> Guards<M> {
     Guards { axes: from_fn(|axis| guards.axes[axis]), reactions: guards.reactions }
+}
+
+/// How the first `M` axes are homed.
+fn homing_of_axes<const N: usize, const M: usize>(machine: &Machine<N>) -> HomingFigures<M> {
+    HomingFigures { axes: from_fn(|axis| homing_figures(machine, axis)) }
 }
 
 /// The item with the first `M` of its axes.

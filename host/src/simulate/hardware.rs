@@ -71,7 +71,7 @@ impl<'a, const N: usize> SimulatedHardware<'a, N> {
 
     /// Adds home switches and index latches of the axes that have settings for them, where encoders read
     /// `counts`.
-    pub(super) fn add_homes(&mut self, machine: &Machine<N>, counts: [Counts; N]) {
+    pub fn add_homes(&mut self, machine: &Machine<N>, counts: [Counts; N]) {
         let truth = self.machine.truth();
         self.homes = core::array::from_fn(|axis| {
             let homing = machine.axes[axis].homing.as_ref()?;

@@ -21,6 +21,9 @@ pub enum HomeError {
     /// No axis has homing settings.
     #[error("found no [axis.homing], expected one for each axis that is to be homed")]
     NoAxis,
+    /// There is no such axis.
+    #[error("found axis {0}, expected one with [axis.homing]")]
+    Name(String),
     /// An axis was not homed.
     #[error("axis {axis}: {source}")]
     Axis {
@@ -53,8 +56,8 @@ pub struct HomedAxis {
     pub unit: AxisUnit,
     /// Where the axis stands: its actual position \[mm, °\].
     pub position_mm: f64,
-    /// Where it truly stands, from where it was switched on \[mm, °\].
-    pub true_mm: f64,
+    /// Where it truly stands, from where it was switched on \[mm, °\]; nobody knows of a board's.
+    pub true_mm: Option<f64>,
 }
 
 impl<R: Real, const N: usize> Session<'_, R, N> {
@@ -106,7 +109,7 @@ impl<R: Real, const N: usize> Session<'_, R, N> {
                 HomingStep::Move(next) => jog = Some(next),
                 HomingStep::Done(homed) => {
                     let position_mm = self.set[axis].to_mm();
-                    let true_mm = self.simulated.truth()[axis].position_mm;
+                    let true_mm = Some(self.simulated.truth()[axis].position_mm);
                     let ticks = self.ticks - first;
                     return Ok(HomedAxis { name: name.clone(), homed, ticks, unit, position_mm, true_mm });
                 }
@@ -124,13 +127,19 @@ pub struct Homes<'a, const N: usize = 3> {
 }
 
 impl<'a, const N: usize> Homes<'a, N> {
-    /// Those of a machine.
+    /// Those of a machine with these names, or all.
     ///
     /// # Errors
-    /// There are none.
-    pub fn new(machine: &'a Machine<N>) -> Result<Self, HomeError> {
+    /// There are none, or one of the names is none of theirs.
+    pub fn new(machine: &'a Machine<N>, names: &[String]) -> Result<Self, HomeError> {
         let settings = machine.driven_axes().iter().enumerate();
-        let axes: Vec<_> = settings.filter_map(|(axis, of)| Some((axis, of.homing.as_ref()?))).collect();
+        let axes = settings.filter_map(|(axis, of)| Some((axis, of.homing.as_ref()?)));
+        let name = |axis: usize| &machine.axes[axis].name;
+        let mut axes: Vec<_> = axes.collect();
+        if let Some(other) = names.iter().find(|other| axes.iter().all(|&(axis, _)| name(axis) != *other)) {
+            return Err(HomeError::Name(other.clone()));
+        }
+        axes.retain(|&(axis, _)| names.is_empty() || names.contains(name(axis)));
         if axes.is_empty() { Err(HomeError::NoAxis) } else { Ok(Self { machine, axes }) }
     }
 

@@ -9,6 +9,7 @@ use std::convert::Infallible;
 use motion_kernel::axis::AxesConfig;
 use motion_kernel::exec::ExecState;
 use motion_kernel::hal::Encoder;
+use motion_kernel::homing::AxisHoming;
 use motion_kernel::jog::JogAxis;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::law::Limits;
@@ -26,7 +27,7 @@ use super::faults;
 use super::hardware::{Simulated, SimulatedHardware};
 use super::job::RunInfo;
 use super::run::trace_row;
-use crate::machine::{AxisSettings, Machine};
+use crate::machine::{AxisSettings, HomingSettings, Machine};
 use crate::trace::TracedFault;
 
 /// Path enough to stop on at any feed, as for a run under live control.
@@ -158,6 +159,12 @@ impl<'a, R: Real, const N: usize> Session<'a, R, N> {
             }
         }
     }
+}
+
+/// How a board homes an axis; none if it is not homed.
+pub(crate) fn homing_figures<const N: usize>(machine: &Machine<N>, axis: usize) -> Option<AxisHoming> {
+    let JogAxis { feed_mm_s, limits, .. } = jog_axis(machine, axis);
+    machine.axes[axis].homing.map(|HomingSettings { config, .. }| AxisHoming { config, feed_mm_s, limits })
 }
 
 /// What an axis may do by itself, not knowing where it is: its limits, and those of any path, which bind linear axes.

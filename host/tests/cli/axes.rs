@@ -41,6 +41,44 @@ fn home_finds_the_reference() {
     assert!(error.contains(expected), "{error}");
 }
 
+/// On a board the same references, with their keys; what the board or the command refuses.
+#[test]
+fn home_on_a_board() {
+    let workspace = Workspace::new("home-on-a-board");
+    let file = workspace.stdout(&["machine"]);
+    let (before, homing) = file.split_once("#[axis.homing]").expect("homing");
+    let (homing, after) = homing.split_once("\n\n").expect("its end");
+    let homing = format!("[axis.homing]{homing}").replace("\n#", "\n").replace("\n ", "\n# ");
+    // Near, as time passes there.
+    let homing = homing.replace("closes_mm = -180.0", "closes_mm = -20.0");
+    let homing = homing
+        .replace("approach_mm_s = 2.0", "approach_mm_s = 20.0")
+        .replace("position_mm = -250.0", "position_mm = -27.5");
+    workspace.put("homed.toml", &[before, &homing, "\n\n", after].concat());
+    let home = ["home", "--machine", "homed.toml", "--json"];
+    let there = workspace.json(&[&home[..], &["--axis", "X", "--port", "simulator", "--enable"]].concat());
+    let here = workspace.json(&home);
+    for key in ["axis", "counts", "index_counts"] {
+        assert_eq!(there[0][key], here[0][key], "{there} {here}");
+    }
+    assert!(there[0]["true_mm"].is_null() && number(&there[0]["position_mm"]).abs() < 0.01, "{there}");
+    assert_eq!(
+        workspace.refusal(&["home", "--machine", "homed.toml", "--axis", "Y"]),
+        "homed.toml: found axis Y, expected one with [axis.homing]"
+    );
+    // The same board has had no fault.
+    let empty = workspace.motion(&["flight", "--port", "simulator"]);
+    let error = String::from_utf8_lossy(&empty.stderr);
+    assert!(empty.status.code() == Some(1) && error.contains("found an empty flight recorder"), "{error}");
+    for (more, expected) in
+        [(&[][..], "expected --enable"), (&["--dead-man", "0.1"], "expected from 0.15 to 60 s")]
+    {
+        let refusal =
+            workspace.refusal(&[&["home", "--machine", "homed.toml", "--port", "simulator"], more].concat());
+        assert!(refusal.contains(expected), "{refusal}");
+    }
+}
+
 /// Keys pressed one after the other: by a distance, to the soft limit, released on the way; and what is
 /// refused.
 #[test]

@@ -114,6 +114,8 @@ pub struct BoardLink {
     /// The byte from which on the parameters are asked for.
     read_from: Option<u32>,
     is_written_due: bool,
+    /// The row of the flight recorder that is asked for.
+    flight_row: Option<u16>,
     /// Who wants the scope, and after which snapshot he needs another one.
     scope: Option<(u32, u32)>,
     controls: Controls,
@@ -159,6 +161,7 @@ impl BoardLink {
             has_parameters: false,
             read_from: None,
             is_written_due: false,
+            flight_row: None,
             scope: None,
             controls: Controls::NONE,
             is_changed: false,
@@ -239,6 +242,7 @@ impl BoardLink {
             | Request::Read { session, asker, .. }
             | Request::Write { session, asker, .. }
             | Request::Scope { session, asker, .. }
+            | Request::Flight { session, asker, .. }
                 if (session, asker) != (self.session, self.asker) =>
             {
                 self.is_welcome_due = true;
@@ -258,6 +262,7 @@ impl BoardLink {
             Request::Read { offset, .. } => self.read_from = Some(offset),
             Request::Write { .. } => self.has_parameters = true,
             Request::Scope { asker, after, .. } => self.scope = after.map(|after| (asker, after)),
+            Request::Flight { row, .. } => self.flight_row = Some(row),
         }
     }
 
@@ -266,6 +271,23 @@ impl BoardLink {
     #[must_use]
     pub const fn scope(&self) -> Option<(u32, u32)> {
         self.scope
+    }
+
+    /// The row of the flight recorder that is asked for, from 0, until it was answered.
+    #[must_use]
+    pub const fn flight_row(&self) -> Option<u16> {
+        self.flight_row
+    }
+
+    /// Writes a row of the flight recorder to `out`, of `rows`, as [`Self::transmit`] does about all else. `frame` is
+    /// that of [`FlightRow::to_frame`](crate::flight::FlightRow::to_frame), or empty where there is no such row.
+    pub fn transmit_flight(&mut self, rows: u16, frame: &[u8], out: &mut [u8]) -> usize {
+        let Some(row) = self.flight_row.take() else { return 0 };
+        let Some(mut payload) = Payload::of(&Reply::<1>::Flight { session: self.session, row, rows }) else {
+            return 0;
+        };
+        // There is room for nine axes.
+        if payload.push_all(frame.iter().copied()) { payload.frame(out) } else { 0 }
     }
 
     /// Writes a frame of the scope to `out`, as [`Self::transmit`] does about all else.

@@ -9,6 +9,7 @@ use super::frame::{Deframer, PAYLOAD_MAX, Payload};
 use super::message::{
     Build, Controls, Identity, Mode, Piece, Record, Reply, Request, Status, Taken, Welcome, WriteError,
 };
+use crate::flight::FlightRow;
 use crate::program::compact::Encoder;
 use crate::program::{Checksum, Item, take};
 
@@ -75,6 +76,15 @@ pub enum Event<const AXES: usize> {
         /// What [`Replay::take`](crate::scope::Replay::take) takes.
         body: Piece,
     },
+    /// A row of its flight recorder, which was [asked for](HostLink::read_flight).
+    Flight {
+        /// Its number.
+        row: u16,
+        /// How many there are.
+        rows: u16,
+        /// The row; none where there is no such row.
+        kept: Option<FlightRow<f64, AXES>>,
+    },
     /// It can't read an item. Nothing more is sent.
     Unreadable {
         /// The item's number.
@@ -104,6 +114,7 @@ enum Session {
 enum Ask {
     Read { offset: u32 },
     Write { record: Record, offset: u32, piece: Piece },
+    Flight { row: u16 },
 }
 
 /// The scope as far as it has come.
@@ -244,6 +255,17 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         })
     }
 
+    /// Has `axes` homed, the lowest bit is the first one's, one after the other; what there was before is given up. A hold or an
+    /// abort ends it, and a silence of `dead_man_ms`. See [`Self::abort`].
+    #[must_use]
+    pub fn home(&mut self, axes: u16, dead_man_ms: u16) -> bool {
+        self.give_up(0, |controls| {
+            (controls.mode, controls.presses) = (Mode::Run, controls.presses.wrapping_add(1));
+            (controls.home_axes, controls.homings) = (axes, controls.homings.wrapping_add(1));
+            controls.dead_man_ms = dead_man_ms;
+        })
+    }
+
     /// Clears the board's fault. See [`Self::control`].
     #[must_use]
     pub fn clear_fault(&mut self) -> bool {
@@ -370,6 +392,11 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         (self.ask, self.ask_ms) = (Some(Ask::Write { record, offset, piece }), None);
     }
 
+    /// Asks for a row of the flight recorder, from 0, until [`Event::Flight`] comes.
+    pub fn read_flight(&mut self, row: u16) {
+        (self.ask, self.ask_ms) = (Some(Ask::Flight { row }), None);
+    }
+
     /// Switches the scope on, or off. Its frames come as [`Event::Scope`]s; where one is missing, a snapshot is asked for.
     pub fn set_scope(&mut self, is_on: bool) {
         let was_on = core::mem::replace(&mut self.scope, is_on.then(ScopeStream::default)).is_some();
@@ -430,7 +457,19 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
                         on_event(Event::Scope { is_first, body });
                     }
                 }
-                Reply::Parameters { .. } | Reply::Written { .. } | Reply::Scope { .. } => {}
+                Reply::Flight { session, row, rows } if self.is_of(session) => {
+                    if self.ask == Some(Ask::Flight { row }) {
+                        let kept = FlightRow::from_frame(rest).ok();
+                        if kept.is_some() || rest.is_empty() {
+                            self.ask = None;
+                            on_event(Event::Flight { row, rows, kept });
+                        }
+                    }
+                }
+                Reply::Parameters { .. }
+                | Reply::Written { .. }
+                | Reply::Scope { .. }
+                | Reply::Flight { .. } => {}
                 Reply::Welcome { session, asker, build } => {
                     let welcome = if Build::THIS.understands(&build) { take::<Welcome>(rest) } else { None };
                     if asker == self.asker {
@@ -582,6 +621,7 @@ impl<const AXES: usize, const ITEMS: usize, const BYTES: usize> HostLink<AXES, I
         {
             self.ask_ms = Some(now_ms);
             return match ask {
+                Ask::Flight { row } => frame(&Request::Flight { session, asker: self.asker, row }, out),
                 Ask::Read { offset } => frame(&Request::Read { session, asker: self.asker, offset }, out),
                 Ask::Write { record, offset, piece } => {
                     let request = Request::Write { session, asker: self.asker, record, offset };

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::fault::Fault;
 use crate::hal::BoardOutputs;
+use crate::homing::{Homed, HomingError, HomingStage};
 use crate::units::Position;
 
 /// The version of this protocol. Raised where a message means something else, in the same form or another one.
@@ -75,6 +76,8 @@ pub(super) enum Request {
     /// Switches the scope on, with another snapshot if `after` is not answered yet: the number of the last snapshot that is of
     /// no use any more. None switches it off.
     Scope { session: u32, asker: u32, after: Option<u32> },
+    /// Asks for a row of the flight recorder, from 0.
+    Flight { session: u32, asker: u32, row: u16 },
 }
 
 /// Parameters on their way: how many bytes, their checksum, and which attempt it is.
@@ -147,6 +150,9 @@ pub(super) enum Reply<const AXES: usize> {
     /// Of the scope: what follows, to the payload's end, is to be read in order. The number of the snapshot before it, and
     /// which frame since that it is.
     Scope { session: u32, epoch: u32, number: u32 },
+    /// A row of the flight recorder follows, as a frame, to the payload's end; of so many. Without one nothing follows: there was
+    /// no fault since the start, or since the last one was cleared, or it is too young.
+    Flight { session: u32, row: u16, rows: u16 },
 }
 
 /// What follows on [`Reply::Welcome`]: what the board is, and the controls that are obeyed.
@@ -204,6 +210,10 @@ pub struct Controls {
     pub power_presses: u16,
     /// Counts commands to clear a fault.
     pub fault_resets: u16,
+    /// The axes to be homed, the lowest bit is the first one's.
+    pub home_axes: u16,
+    /// Counts commands to home them, one after the other: as long as the mode is [`Mode::Run`].
+    pub homings: u16,
 }
 
 impl Controls {
@@ -220,6 +230,8 @@ impl Controls {
         is_enabled: false,
         power_presses: 0,
         fault_resets: 0,
+        home_axes: 0,
+        homings: 0,
     };
 
     /// Whether all of them are within their ranges.
@@ -295,7 +307,120 @@ pub struct Status<const AXES: usize> {
     pub is_ready: bool,
     /// What went wrong, until it is cleared.
     pub fault: Option<Fault<f64>>,
+    /// What has become of homing, of the last command.
+    pub homing: HomingProgress,
+    /// The reference of every axis that is homed.
+    #[serde(with = "crate::array")]
+    pub homed: [Option<Homed>; AXES],
 }
+
+/// What has become of homing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+pub enum HomingProgress {
+    /// Nothing was to be homed.
+    #[default]
+    None,
+    /// An axis is being homed; or the machine comes to rest for it.
+    UnderWay {
+        /// The axis, from 0.
+        axis: u16,
+        /// What it is doing.
+        stage: HomingStage,
+    },
+    /// All axes are homed that were to be.
+    Done,
+    /// It has ended early, at rest unless the drives are off. The axes before this one are homed.
+    Failed {
+        /// The axis, from 0.
+        axis: u16,
+        /// Why.
+        failure: HomingFailure,
+    },
+}
+
+/// Why a board has not homed an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Schema)]
+pub enum HomingFailure {
+    /// It has no settings for that, or there is no such axis.
+    NoSettings,
+    /// The drives are off, or were switched off.
+    DrivesOff,
+    /// It is in a fault.
+    Fault,
+    /// It was held or aborted.
+    Aborted,
+    /// It heard nothing for the dead man's time.
+    Silent,
+    /// A move is refused: a feed or a length is out of range.
+    Refused,
+    /// A move could not be executed.
+    Failed,
+    /// See [`HomingError::NoSwitch`].
+    NoSwitch {
+        /// Within this length \[mm\].
+        travel_mm: f64,
+    },
+    /// See [`HomingError::StuckSwitch`].
+    StuckSwitch {
+        /// Within this length \[mm\].
+        back_off_mm: f64,
+    },
+    /// See [`HomingError::LostSwitch`].
+    LostSwitch {
+        /// Within this length \[mm\].
+        back_off_mm: f64,
+    },
+    /// See [`HomingError::NoIndex`].
+    NoIndex {
+        /// Within this length beyond the switch \[mm\].
+        index_mm: f64,
+    },
+    /// See [`HomingError::NoLatch`].
+    NoLatch,
+}
+
+impl From<HomingError> for HomingFailure {
+    fn from(error: HomingError) -> Self {
+        match error {
+            HomingError::Move(_) => Self::Refused,
+            HomingError::NoSwitch { travel_mm } => Self::NoSwitch { travel_mm },
+            HomingError::StuckSwitch { back_off_mm } => Self::StuckSwitch { back_off_mm },
+            HomingError::LostSwitch { back_off_mm } => Self::LostSwitch { back_off_mm },
+            HomingError::NoIndex { index_mm } => Self::NoIndex { index_mm },
+            HomingError::NoLatch => Self::NoLatch,
+            HomingError::Aborted => Self::Aborted,
+            HomingError::Failed => Self::Failed,
+        }
+    }
+}
+
+impl core::fmt::Display for HomingFailure {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let of_kernel = match *self {
+            Self::NoSettings => return f.write_str("no settings on the board: expected [axis.homing]"),
+            Self::DrivesOff => return f.write_str("the drives are off: expected them on until it is homed"),
+            Self::Fault => return f.write_str("the board is in a fault: expected none"),
+            Self::Silent => {
+                return f.write_str(
+                    "the board heard nothing for the dead man's time: expected to be told to go on",
+                );
+            }
+            Self::Refused => {
+                return f.write_str("a move is refused: expected feeds and lengths that the axis has");
+            }
+            Self::NoSwitch { travel_mm } => HomingError::NoSwitch { travel_mm },
+            Self::StuckSwitch { back_off_mm } => HomingError::StuckSwitch { back_off_mm },
+            Self::LostSwitch { back_off_mm } => HomingError::LostSwitch { back_off_mm },
+            Self::NoIndex { index_mm } => HomingError::NoIndex { index_mm },
+            Self::NoLatch => HomingError::NoLatch,
+            Self::Aborted => HomingError::Aborted,
+            Self::Failed => HomingError::Failed,
+        };
+        of_kernel.fmt(f)
+    }
+}
+
+impl core::error::Error for HomingFailure {}
 
 /// A machine's state. Whether it is in a fault, [`Status::fault`] tells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
@@ -316,4 +441,6 @@ pub enum State {
     Held,
     /// An item can't be executed; at rest after those before it.
     Refused,
+    /// An axis is being homed.
+    Homing,
 }

@@ -11,6 +11,7 @@
 //!           ── parameters, in pieces, while drives are off ────►            ─► ParameterBuffer
 //!           ◄── taken: which came, how many more may ───────────            ◄─ ItemQueue
 //!           ◄── status: position, feed, line, fault ────────────            ◄─ Status        may be lost
+//!           ◄── flight recorder, row by row, as asked for ────            ◄─ FlightRecorder
 //!           ◄── scope: what every tick consumed ───────────────            ◄─ BoardScope    may be lost
 //! ```
 //!
@@ -40,5 +41,7 @@ mod tests;
 pub use board::{BoardLink, Came, ItemQueue};
 pub use frame::{Deframer, FRAME_MAX};
 pub use host::{Event, HostLink, PushError};
-pub use message::{Build, Controls, Identity, Mode, Piece, State, Status, WriteError};
+pub use message::{
+    Build, Controls, HomingFailure, HomingProgress, Identity, Mode, Piece, State, Status, WriteError,
+};
 pub use parameters::ParameterBuffer;

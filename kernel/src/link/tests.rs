@@ -150,6 +150,9 @@ struct Bench {
     now_ms: u32,
     events: Vec<Event<3>>,
     statuses: u64,
+    /// What the board tells of homing, and what has come of it.
+    homing: HomingProgress,
+    told: HomingProgress,
 }
 
 impl Bench {
@@ -166,6 +169,8 @@ impl Bench {
             now_ms: u32::MAX - 3000,
             events: Vec::new(),
             statuses: 0,
+            homing: HomingProgress::None,
+            told: HomingProgress::None,
         }
     }
 
@@ -209,6 +214,8 @@ impl Bench {
             starvations: 3,
             is_ready: true,
             fault: None,
+            homing: self.homing,
+            homed: [None; 3],
         };
         let status = self.random.chance(0.02).then_some(status);
         let length = self.board.link.transmit(self.now_ms, &self.board.items, status, &mut out);
@@ -216,11 +223,12 @@ impl Bench {
             self.up.send(&self.random, &out[..length]);
         }
         let bytes = self.up.receive(&self.random);
-        let (events, statuses) = (&mut self.events, &mut self.statuses);
+        let (events, statuses, homing) = (&mut self.events, &mut self.statuses, &mut self.told);
         self.host.receive(&bytes, self.now_ms, &mut |event| match event {
             Event::Status(status) => {
                 assert_eq!((status.feed_mm_s, status.line), (12.5, 7));
                 *statuses += 1;
+                *homing = status.homing;
             }
             event => events.push(event),
         });
@@ -656,7 +664,15 @@ fn who_asked_last_has_the_board() {
         let mut bench = Bench::new(seed, permille);
         bench.greet();
         assert!(bench.host.press(Mode::Run) && bench.host.push(Some(&item(0))) == Ok(true));
+        // However many frames are lost: both are there, and the board's answers.
+        let is_there = |bench: &Bench| bench.host.waiting() == 0 && bench.host.is_controlled();
         for _ in 0..3000 {
+            bench.step(1.0);
+        }
+        for _ in 0..30_000 {
+            if is_there(&bench) {
+                break;
+            }
             bench.step(1.0);
         }
         // Held back while the second one has the board.
@@ -696,6 +712,34 @@ fn a_jog_is_held_where_somebody_else_asks() {
         bench.greet();
         let obeyed = bench.board.controls.last().map(|controls| controls.mode);
         assert_eq!((obeyed, bench.host.controls().mode), (Some(expected), expected), "{dead_man_ms} ms");
+    }
+}
+
+/// A command to home gets through a bad wire, once, and what has become of it back. Frames of before that come late change nothing,
+/// and where somebody else asks the board, it is held.
+#[test]
+fn homing_is_commanded_once() {
+    for seed in 700..720 {
+        let mut bench = Bench::new(seed, 150);
+        bench.greet();
+        for (times, axes) in (1..).zip([0b101, 0b10, 0b10]) {
+            assert!(bench.host.home(axes, 250));
+            let failure = HomingFailure::NoSwitch { travel_mm: f64::from(axes) };
+            bench.homing = HomingProgress::Failed { axis: times, failure };
+            for _ in 0..2000 {
+                bench.step(1.0);
+            }
+            let Controls { homings, home_axes, mode, dead_man_ms, .. } =
+                *bench.board.controls.last().expect("some");
+            assert_eq!((homings, home_axes, mode, dead_man_ms), (times, axes, Mode::Run, 250));
+            assert_eq!(bench.told, bench.homing);
+        }
+        let counts: Vec<u16> = bench.board.controls.iter().map(|controls| controls.homings).collect();
+        assert!(counts.is_sorted() && *counts.last().expect("some") == 3, "{counts:?}");
+        bench.host = Host::new(2);
+        bench.greet();
+        let last = bench.board.controls.last().expect("some");
+        assert_eq!((last.homings, last.mode, bench.host.controls().mode), (3, Mode::Hold, Mode::Hold));
     }
 }
 

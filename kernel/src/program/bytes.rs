@@ -5,8 +5,8 @@
 //! | 4 | `MOTN` |
 //! | 1 | version of this format, 6 |
 //! | 1 | number of axes |
-//! | 2 | length of the guards, least significant byte first; 0 for none |
-//! | … | [`Guards`] in the [postcard](https://postcard.jamesmunns.com) wire format; a kernel without guards skips them |
+//! | 2 | length of the guards and of homing, least significant byte first; 0 for none |
+//! | … | [`Guards`] in the [postcard](https://postcard.jamesmunns.com) wire format, and behind them, if any axis is homed, `HomingFigures`; a kernel without guards skips both |
 //! | … | [`Header`], in the same format |
 //! | … | [`Item`]s to the end, each [as few bytes](super::compact) |
 //! | 4 | CRC-32 (ISO-HDLC, the one of zip and Ethernet) of all before it, least significant byte first |
@@ -21,6 +21,8 @@ use super::checksum::Checksum;
 use super::compact::{Decoder, Encoder};
 use super::{Item, wire};
 use crate::axis::{AxisFigures, Guards};
+#[cfg(all(feature = "live", feature = "guards"))]
+use crate::homing::HomingFigures;
 use crate::law::Pulse;
 use crate::queue::PathRules;
 use crate::units::Position;
@@ -112,6 +114,43 @@ pub fn write<'a, const AXES: usize>(
     items: impl IntoIterator<Item = &'a Item<AXES>>,
     out: &mut impl Extend<u8>,
 ) -> Result<(), postcard::Error> {
+    let mut entry = [0; ENTRY_MAX];
+    let guards = match guards {
+        Some(guards) => &*postcard::to_slice(guards, &mut entry)?,
+        None => &[],
+    };
+    write_guarded(header, guards, items, out)
+}
+
+/// [`write`](write()) with guards, and how the axes are homed.
+///
+/// # Errors
+/// See [`write`](write()).
+#[cfg(all(feature = "live", feature = "guards"))]
+pub fn write_homed<'a, const AXES: usize>(
+    header: &Header<AXES>,
+    guards: &Guards<AXES>,
+    homing: &HomingFigures<AXES>,
+    items: impl IntoIterator<Item = &'a Item<AXES>>,
+    out: &mut impl Extend<u8>,
+) -> Result<(), postcard::Error> {
+    if *homing == HomingFigures::NONE {
+        return write(header, Some(guards), items, out);
+    }
+    let mut entry = [0; ENTRY_MAX];
+    let length = postcard::to_slice(guards, &mut entry)?.len();
+    let behind = entry.get_mut(length..).unwrap_or_default();
+    let length = length + postcard::to_slice(homing, behind)?.len();
+    write_guarded(header, entry.get(..length).unwrap_or_default(), items, out)
+}
+
+/// Writes with guards that are written already.
+fn write_guarded<'a, const AXES: usize>(
+    header: &Header<AXES>,
+    guards: &[u8],
+    items: impl IntoIterator<Item = &'a Item<AXES>>,
+    out: &mut impl Extend<u8>,
+) -> Result<(), postcard::Error> {
     if AXES > AXES_MAX {
         return Err(postcard::Error::SerializeBufferFull);
     }
@@ -123,10 +162,6 @@ pub fn write<'a, const AXES: usize>(
     let mut entry = [0; ENTRY_MAX];
     put(&MAGIC);
     put(&[FORMAT, AXES as u8]);
-    let guards = match guards {
-        Some(guards) => &*postcard::to_slice(guards, &mut entry)?,
-        None => &[],
-    };
     // An entry is shorter than 2¹⁶ bytes.
     put(&(guards.len() as u16).to_le_bytes());
     put(guards);
@@ -219,7 +254,25 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
             return Ok(None);
         }
         match wire::take(self.guards) {
-            Some((guards, [])) => Ok(Some(guards)),
+            // Homing may follow.
+            Some((guards, rest)) if rest.is_empty() || cfg!(feature = "live") => Ok(Some(guards)),
+            _ => Err(ProgramError::Malformed { at: PREFIX + 2 }),
+        }
+    }
+
+    /// How the machine's axes are homed.
+    ///
+    /// # Errors
+    /// The bytes in its place are something else.
+    #[cfg(all(feature = "live", feature = "guards"))]
+    pub fn homing(&self) -> Result<HomingFigures<AXES>, ProgramError> {
+        if self.guards.is_empty() {
+            return Ok(HomingFigures::NONE);
+        }
+        let behind = wire::take::<Guards<AXES>>(self.guards).map(|(_, behind)| behind);
+        match behind.map(|behind| (behind.is_empty(), wire::take(behind))) {
+            Some((true, _)) => Ok(HomingFigures::NONE),
+            Some((false, Some((homing, [])))) => Ok(homing),
             _ => Err(ProgramError::Malformed { at: PREFIX + 2 }),
         }
     }

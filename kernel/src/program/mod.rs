@@ -47,6 +47,8 @@ pub(crate) mod supply;
 mod switching;
 mod wire;
 
+#[cfg(all(feature = "live", feature = "guards"))]
+pub use bytes::write_homed;
 pub use bytes::{FORMAT, Header, Items, ProgramError, Reader, write};
 #[cfg(feature = "live")]
 pub use check::check_live;

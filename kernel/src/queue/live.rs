@@ -193,10 +193,11 @@ impl<'a, R: Real, const AXES: usize> LiveFeeder<'a, R, AXES> {
     /// Tells the log that [`LiveFeeder::restart`] has begun anew, after `tick`: with the items of the program after so many
     /// aborts, from the one with the number `first` on.
     #[cfg(feature = "scope")]
-    pub fn note_restart(&mut self, tick: u64, position: [Position; AXES], (aborts, first): (u16, u32)) {
+    pub fn note_restart(&mut self, tick: u64, position: [Position; AXES], from: Option<(u16, u32)>) {
         let path_entered = self.shared.path_entered.load(Ordering::Relaxed);
         if let Some(log) = &mut self.log {
-            log.restart(tick, position, Begun { aborts, first, path_entered });
+            let (aborts, first) = from.unwrap_or_default();
+            log.restart(tick, position, Begun { aborts, first, path_entered, is_own: from.is_none() });
         }
     }
 

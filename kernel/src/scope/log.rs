@@ -8,7 +8,7 @@ use heapless::Deque;
 use serde::{Deserialize, Serialize};
 
 use crate::live::ListItem;
-use crate::units::Position;
+use crate::units::{Counts, Position};
 
 /// Room for what is handed over between two frames: two lists, and some words.
 const PLACES: usize = 64;
@@ -45,6 +45,8 @@ pub(crate) struct Begun {
     pub(crate) first: u32,
     /// How many pieces and ends of stretch had entered before.
     pub(crate) path_entered: u32,
+    /// They come from nowhere: the board makes them itself, to home an axis.
+    pub(crate) is_own: bool,
 }
 
 /// What a board's background does to its kernel.
@@ -63,6 +65,15 @@ pub enum Command {
     ClearFault,
     /// [`Kernel::resume`](crate::kernel::Kernel::resume).
     Resume,
+    /// [`Kernel::reference`](crate::kernel::Kernel::reference).
+    Reference {
+        /// The axis, from 0.
+        axis: u16,
+        /// Its encoder's counts.
+        counts: Counts,
+        /// The position there.
+        position: Position,
+    },
 }
 
 /// From which tick on it counts.
@@ -89,7 +100,7 @@ pub struct Log<const AXES: usize> {
 
 impl<const AXES: usize> Log<AXES> {
     pub(super) const fn new() -> Self {
-        let begun = Begun { aborts: 0, first: 0, path_entered: 0 };
+        let begun = Begun { aborts: 0, first: 0, path_entered: 0, is_own: false };
         Self { entries: Deque::new(), is_on: false, is_lost: false, begun }
     }
 

@@ -18,7 +18,7 @@ use crate::live::ListItem;
 use crate::num::Real;
 use crate::program::supply::Ready;
 use crate::program::{Header, Item};
-use crate::queue::{Change, Intake, IntakeState, LiveFeeder, LiveStreams, PathItem};
+use crate::queue::{Change, Intake, IntakeState, LISTS, LiveFeeder, LiveStreams, PathItem};
 use crate::trace::Trace;
 use crate::units::{Counts, Position};
 
@@ -213,6 +213,10 @@ impl<'a, R: Real, const AXES: usize> Replay<'a, R, AXES> {
         self.tripped.clear();
         self.trips = trips.into_iter().flatten().collect();
         self.stage = Stage::Following;
+        if begun.is_own {
+            self.lose_items(on_told);
+            return Ok(());
+        }
         // What the board's tick has passed already.
         for _ in 0..intake.path_taken.wrapping_sub(begun.path_entered) {
             if self.next_path_item(items)?.is_none() {
@@ -282,6 +286,9 @@ impl<'a, R: Real, const AXES: usize> Replay<'a, R, AXES> {
                 HANDED => {
                     let handed = bytes.value().ok_or_else(|| self.malformed())?;
                     self.hand(&handed)?;
+                    if matches!(handed, Handed::Restart { program: Begun { is_own: true, .. }, .. }) {
+                        self.lose_items(on_told);
+                    }
                 }
                 TRIP => {
                     let kind: FaultKind<R> = bytes.value().ok_or_else(|| self.malformed())?;
@@ -301,6 +308,14 @@ impl<'a, R: Real, const AXES: usize> Replay<'a, R, AXES> {
     /// Does what the board's background did.
     fn hand(&mut self, handed: &Handed<AXES>) -> Result<(), ReplayError> {
         match *handed {
+            Handed::Begin { list }
+            | Handed::Item { list, .. }
+            | Handed::Kept { list, .. }
+            | Handed::GiveUp { list }
+                if list >= LISTS =>
+            {
+                return Err(self.malformed());
+            }
             Handed::Begin { list } => {
                 // The board's tick has emptied it.
                 self.intake.clear_list(list);
@@ -329,6 +344,9 @@ impl<'a, R: Real, const AXES: usize> Replay<'a, R, AXES> {
                 self.kernel.clear_fault();
             }
             Command::Resume => self.kernel.resume(),
+            Command::Reference { axis, counts, position } => {
+                self.kernel.reference(axis.into(), counts, position);
+            }
         }
     }
 

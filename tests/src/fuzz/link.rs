@@ -318,7 +318,8 @@ impl Bench {
                 | Event::Status(_)
                 | Event::Parameters { .. }
                 | Event::Written { .. }
-                | Event::Scope { .. } => {}
+                | Event::Scope { .. }
+                | Event::Flight { .. } => {}
             }
         }
     }

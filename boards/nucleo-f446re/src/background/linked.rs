@@ -7,6 +7,7 @@ use core::sync::atomic::Ordering;
 
 use cortex_m::peripheral::SCB;
 use motion_board::LogLine;
+use motion_kernel::homing::HomingFigures;
 use motion_kernel::law::Pulse;
 use motion_kernel::link::{BoardLink, Build, Identity};
 use motion_kernel::program::FORMAT;
@@ -33,6 +34,7 @@ pub(crate) struct Background {
     /// Until it runs.
     feeder: Option<Feeder>,
     pulse: Pulse,
+    homing: HomingFigures<AXES>,
     identity: Identity,
     parameters: &'static [u8],
     button: ButtonPin,
@@ -70,8 +72,9 @@ impl Background {
             outputs: BOARD.outputs,
             machine: machine.program.machine_checksum(),
         };
+        let (pulse, homing) = (header.pulse, machine.homing);
         (
-            Self { feeder: Some(feeder), pulse: header.pulse, identity, parameters, button, port },
+            Self { feeder: Some(feeder), pulse, homing, identity, parameters, button, port },
             intake,
             OfTick,
         )
@@ -79,7 +82,7 @@ impl Background {
 
     /// Runs forever.
     pub(crate) fn run(&'static mut self, mut control: impl Mutex<T = Control>) -> ! {
-        let Self { feeder, pulse, identity, parameters, button, port } = self;
+        let Self { feeder, pulse, homing, identity, parameters, button, port } = self;
         board::write(&LogLine::<Number, AXES>::Linked);
         while !port.has_come() {
             count_step();
@@ -89,6 +92,7 @@ impl Background {
         // first byte comes, which its clock decides and not this one's: here in cycles of 6 ns since the start.
         let mut linked = begin(cycles(), identity, defmt::unwrap!(feeder.take()), *pulse);
         linked.set_parameters(parameters);
+        linked.set_homing(homing, *pulse);
         let mut clock = Clock { ticks: 0, ms: 0 };
         loop {
             wait_for_tick();

@@ -49,9 +49,9 @@ const CLOCK_HZ: u32 = 25_000_000;
 const PERIOD_MAX: u32 = 1 << 24;
 /// Items that have room before they are taken into the streams.
 const ITEMS: usize = 256;
-/// Rows of the flight recorder, which nobody asks for here.
-const ROWS: usize = 2;
-const AFTER: usize = 1;
+/// Rows of the flight recorder, and how many of them come after a fault.
+const ROWS: usize = 64;
+const AFTER: usize = 16;
 /// Ticks that wait for a PC that wants all of them: those of a plan for another override.
 const RECORDS: usize = 256;
 
@@ -142,6 +142,7 @@ fn run() -> Result<Infallible, &'static CStr> {
     let pulse = machine.header().pulse;
     let linked = singleton!(Linked = Linked::new(&board, link, feeder, pulse)).ok_or(TWICE)?;
     linked.set_parameters(record);
+    linked.set_homing(&machine.homing, pulse);
     linked.set_scope(scope, log);
     let mut port = Port::start(&mut peripherals.NVIC).ok_or(TWICE)?;
     tick_every(period, &mut peripherals.SYST);
@@ -204,6 +205,7 @@ fn start(
     let simulated: &'static Simulated = singleton!(Simulated = simulated).ok_or(TWICE)?;
     let mut hardware = Hardware::new(simulated).map_err(|_| c"the simulated converter does not start")?;
     let Ok(counts) = hardware.latch();
+    hardware.add_homes(machine.header(), &machine.homing, counts);
     let kernel = Kernel::new(&machine.axes, machine.header().start, counts);
     let foreground = place(kernel, hardware).ok_or(TWICE)?;
     critical_section::with(|cs| FOREGROUND.borrow(cs).set(Some(foreground)));

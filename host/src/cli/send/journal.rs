@@ -49,6 +49,9 @@ pub(super) struct Record {
     /// The program line there, and where motion was \[mm\].
     pub line: u32,
     pub set_mm: Vec<f64>,
+    /// Whether each axis was homed there.
+    #[serde(default)]
+    pub homed: Vec<bool>,
     /// All is driven.
     pub is_finished: bool,
 }
@@ -81,6 +84,7 @@ impl Record {
             driven: 0,
             line: 0,
             set_mm: Vec::new(),
+            homed: Vec::new(),
             is_finished: false,
         }
     }
@@ -200,9 +204,10 @@ impl Journal {
     }
 
     /// Motion has come so far.
-    pub(super) fn note(&mut self, place: Place, set_mm: Vec<f64>) {
+    pub(super) fn note(&mut self, place: Place, set_mm: Vec<f64>, homed: Vec<bool>) {
         if self.record.set_mm.is_empty() || self.record.driven != place.driven {
             (self.record.driven, self.record.line, self.record.set_mm) = (place.driven, place.line, set_mm);
+            self.record.homed = homed;
             self.put();
         }
     }

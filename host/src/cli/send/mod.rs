@@ -283,7 +283,7 @@ fn send_job<R: Root, const N: usize, const M: usize>(
     sent: &Sent<'_>,
     (plan, whole): (&Plan<N>, Job<M>),
     machine: &Machine<N>,
-    connection: Connection<M>,
+    mut connection: Connection<M>,
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
     let &Sent { arguments, resumed, program, sum, name } = sent;
@@ -300,7 +300,8 @@ fn send_job<R: Root, const N: usize, const M: usize>(
             if resumed.is_of(connection.controls().program) {
                 found = Found::GivenUp;
             }
-            let (job, middle) = resumed.rest::<R, M>(program, (&whole, name), arguments.yes, &connection)?;
+            let (job, middle) =
+                resumed.rest::<R, N, M>(machine, program, (&whole, name), arguments.yes, &mut connection)?;
             (job, Some(middle))
         }
         (None, Some(line)) => {
@@ -548,7 +549,8 @@ fn note<const M: usize>(
     {
         let place = progress.tell(status.tick, Place { driven, line: status.line });
         let set_mm = status.set.iter().take(axes).map(|position| position.to_mm()).collect();
-        journal.note(place, set_mm);
+        let homed = status.homed.iter().take(axes).map(Option::is_some).collect();
+        journal.note(place, set_mm, homed);
     }
 }
 

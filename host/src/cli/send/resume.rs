@@ -2,6 +2,7 @@
 
 use std::io::Write;
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use motion_kernel::num::Root;
@@ -17,19 +18,24 @@ use crate::cli::input;
 use crate::cli::port::{DriveArguments, PortArguments};
 use crate::cli::scope::ScopeArguments;
 use crate::gcode::{Program, StepKind};
+use crate::machine::{AxisSettings, Machine};
 use crate::planning::PlanningError;
 
 const EXAMPLES: &str = "\
 Examples:
   motion resume --port /dev/ttyACM0            goes on with what `motion send` drove there last
+  motion home --machine mine.toml --port /dev/ttyACM0 --enable
+  motion resume part.journal.json --port /dev/ttyACM0
+                                               after the board was off: its axes have [axis.homing]
   motion resume part.journal.json --port /dev/ttyACM0 --enable --homed
-                                               after the board was off, and the machine was homed
+                                               the same of a machine whose axes are brought to their zero by hand
 
 The program goes on at the start of the piece of path that was under way. The machine first moves straight there, with
 spindle and coolant on as the program has them: bring it to a place from where that way is free.
 
-A board that was off does not know where the machine is: home it, so that the board's zero is the one of before, and say so
-with --homed. A board that has run since still knows it.
+A board that was off does not know where the machine is. Axes with [axis.homing] have to be homed with `motion home --port`, as
+they were when the program was driven; the board says which are. Of the others say with --homed that the board's zero is the
+one of before. A board that has run since still knows it, but for an axis whose encoder was lost.
 
 Exit status: that of `motion send`; 2 if program, machine or options are not those of the journal.";
 
@@ -43,9 +49,12 @@ pub struct ResumeArguments {
     journal: Option<PathBuf>,
     #[command(flatten)]
     port: PortArguments,
-    /// The machine is homed: the board's zero is the one of before.
+    /// The axes without [axis.homing] are at their place: the board's zero is the one of before.
     #[arg(long)]
     homed: bool,
+    /// Go on although an axis with [axis.homing] is not homed: the board's zero is the one of before all the same.
+    #[arg(long)]
+    ignore_homing: bool,
     /// Confirm the first motion, for scripts.
     #[arg(long)]
     yes: bool,
@@ -57,6 +66,9 @@ pub struct ResumeArguments {
     #[arg(long)]
     json: bool,
 }
+
+/// The longest time for a status.
+const ANSWER: Duration = Duration::from_secs(5);
 
 /// Why a journal's program can't be gone on with. Displays as "found …, expected …".
 #[derive(Debug, Error)]
@@ -95,6 +107,17 @@ pub enum ResumeError {
         "found a board that has started anew and does not know where the machine is, expected --homed once the machine is homed"
     )]
     Position,
+    /// An axis is not homed.
+    #[error(
+        "found axis {0} not homed, expected it homed by `motion home --port`, or --ignore-homing if the board's zero is the one of before"
+    )]
+    NotHomed(String),
+    /// An axis was not homed when the program was driven.
+    #[error(
+        "found a program that was driven before axis {0} was homed: its zero of then is lost, expected --ignore-homing once the \
+         board's zero is the one of before"
+    )]
+    HomedSince(String),
 }
 
 /// A journal that is gone on with.
@@ -102,6 +125,7 @@ pub(super) struct Resumed {
     path: PathBuf,
     record: Record,
     is_homed: bool,
+    ignores_homing: bool,
 }
 
 /// Reads the journal, and goes on.
@@ -109,7 +133,8 @@ pub(super) struct Resumed {
 /// # Errors
 /// The journal is refused, or what it is about is not the same any more; else those of [`send`](super::send).
 pub fn resume(arguments: &ResumeArguments, out: &mut dyn Write) -> Result<Outcome, CliError> {
-    let &ResumeArguments { ref journal, ref port, homed, yes, drives, ref scope, json } = arguments;
+    let &ResumeArguments { ref journal, ref port, homed, ignore_homing, yes, drives, ref scope, json } =
+        arguments;
     let path = match journal.clone().or_else(|| default_path(&port.port)) {
         Some(path) => path,
         None => {
@@ -118,7 +143,7 @@ pub fn resume(arguments: &ResumeArguments, out: &mut dyn Write) -> Result<Outcom
         }
     };
     let record = Record::read(&path)?;
-    let resumed = Resumed { path, record, is_homed: homed };
+    let resumed = Resumed { path, record, is_homed: homed, ignores_homing: ignore_homing };
     if resumed.record.is_finished {
         return Err(resumed.refused(ResumeError::Finished));
     }
@@ -158,12 +183,13 @@ impl Resumed {
     }
 
     /// What is left of the whole `job`, which is made of what has the checksum `input`, if that is the one of before, on a board that knows where the machine is.
-    pub(super) fn rest<R: Root, const M: usize>(
+    pub(super) fn rest<R: Root, const N: usize, const M: usize>(
         &self,
+        machine: &Machine<N>,
         program: &Program,
         (job, input): (&Job<M>, u32),
         is_confirmed: bool,
-        connection: &Connection<M>,
+        connection: &mut Connection<M>,
     ) -> Result<(Job<M>, Middle), CliError> {
         let record = &self.record;
         let (found, expected) = (job.machine, record.machine_sum);
@@ -174,9 +200,7 @@ impl Resumed {
         if ![job.name, job_name(input, job.machine)].contains(&record.job) {
             return Err(self.refused(ResumeError::Items));
         }
-        if !self.is_homed && (record.session.is_none() || connection.session() != record.session) {
-            return Err(self.refused(ResumeError::Position));
-        }
+        self.require_place(machine, connection)?;
         let item = job.item_behind(record.driven);
         let name = record.program.display().to_string();
         let rest = job.from_item::<R>(item).map_err(|problem| PlanningError::at_line(&name, problem))?;
@@ -186,6 +210,47 @@ impl Resumed {
         let tool = tool_behind(program, rest.begin.stops);
         Ok((rest, Middle { place, tool, is_confirmed }))
     }
+}
+
+impl Resumed {
+    /// Whether the board knows where the machine is.
+    fn require_place<const N: usize, const M: usize>(
+        &self,
+        machine: &Machine<N>,
+        connection: &mut Connection<M>,
+    ) -> Result<(), CliError> {
+        let record = &self.record;
+        let has_run = record.session.is_some() && connection.session() == record.session;
+        let axes = machine.driven_axes();
+        let is_told = |axis: &AxisSettings| axis.homing.is_some();
+        if !has_run && !self.is_homed && !axes.iter().all(is_told) {
+            return Err(self.refused(ResumeError::Position));
+        }
+        if self.ignores_homing || !axes.iter().any(is_told) {
+            return Ok(());
+        }
+        let homed = homed(connection).ok_or_else(|| self.refused(ResumeError::Position))?;
+        for (number, axis) in axes.iter().enumerate().filter(|(_, axis)| is_told(axis)) {
+            let was_homed = record.homed.get(number).copied().unwrap_or(false);
+            let is_homed = homed.get(number).copied().unwrap_or(false);
+            if !is_homed && (was_homed || !has_run) {
+                return Err(self.refused(ResumeError::NotHomed(axis.name.clone())));
+            }
+            if is_homed && !was_homed {
+                return Err(self.refused(ResumeError::HomedSince(axis.name.clone())));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Which axes the board says are homed; none if it does not say.
+fn homed<const M: usize>(connection: &mut Connection<M>) -> Option<[bool; M]> {
+    let begin = Instant::now();
+    while connection.status().is_none() && begin.elapsed() < ANSWER {
+        connection.step(Duration::from_millis(10), &mut |_| {});
+    }
+    connection.status().map(|status| status.homed.map(|homed| homed.is_some()))
 }
 
 /// The tool in the spindle after so many program stops; 0: none that the program knows of.

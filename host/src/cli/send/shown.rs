@@ -155,6 +155,7 @@ fn step_words(step: Step) -> &'static str {
         Step::GivesUp => "giving up what the board has",
         Step::ToStart => "to the start",
         Step::Drives => "program",
+        Step::Homes => "homing",
         Step::Disables => "switching the drives off",
         Step::Aborts => "aborting",
         Step::Done => "done",
