@@ -56,6 +56,10 @@ if the machine file was written; else why not, also where nothing could be tuned
 Circles stay within what the outputs reach and the current limit that was found bears: a circle that is driven slower
 than the others, or not at all, is in not_driven.
 
+--report: parameters with intervals and what is not determined, gains and feedforward with reasons, margins, Bode plots of
+model and measurement, circles before and after. It is written where tuning fails, too, with the reason in red; where an
+argument or a file is refused, it is not.
+
 --learn-output: CSV with time_s from the stretch's first tick on, and a column of mm/s for each axis, added to
 feedforward and linear between rows; CorrectedIntake::correct hands it to the kernel. It has no rows if no correction was
 better than none. Without this option the learnt correction is only shown.

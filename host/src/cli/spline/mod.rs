@@ -32,7 +32,7 @@ one steps in jerk at its knots. The machine moves from the origin to the first p
 Examples:
   motion spline points.csv --feed 3000               through all points, on the reference machine
   motion spline points.csv --tolerance 0.01 --report points.html
-                                                     within 10 µm of each, and the pictures of the run
+                                                     within 10 µm of each; the run, points, deviation
   motion spline --report smoothness.html             published arcs, cubic and quintic side by side
 
 JSON of a run: that of `motion run`, and spline: degree, points, spans, length_mm, deviation_mm (greatest, of a point),

@@ -72,3 +72,24 @@ fn open(title: &str, machine: &Machine, [bold, rest]: [&str; 2], comparisons: &[
     findings.table("Figures", &["*Figure", "Measured", "Expected", "±", "Published", "*"], rows);
     findings
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drive::reference::Figure;
+
+    /// A figure that is missed makes the page red.
+    #[test]
+    fn missed_figures_are_told_in_red() {
+        let machine = Machine::reference();
+        let figure = Figure { quantity: "delay", unit: "ms", paper: 2.0, expected: 2.01, tolerance: 0.1 };
+        let page = |measured: f64| {
+            let findings = open("Step", &machine, ["Delay", "told."], &[Comparison { figure, measured }]);
+            findings.parts().0
+        };
+        let (holds, missed) = (page(2.05), page(2.2));
+        assert!(holds.contains("class=\"result done\"") && holds.contains("All 1 figures"), "{holds}");
+        assert!(missed.contains("class=\"result faulted\""), "{missed}");
+        assert!(missed.contains("1 of 1 figures of the reference machine are missed."), "{missed}");
+    }
+}
