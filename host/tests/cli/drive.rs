@@ -338,7 +338,7 @@ fn drive_tune_reports_its_refusal() {
     assert!(said.contains("report written to r.html"), "{said}");
     let page = workspace.read("r.html");
     assert!(
-        page.contains("<strong>Not tuned:</strong>") && page.contains("is the encoder connected?"),
+        page.contains("<strong>Not tuned:</strong>") && page.contains("the encoder connected?<"),
         "{page}"
     );
     workspace.put("bad.csv", "time_s,command_v,counts\n0,0,0\n0.0005,0,what\n");

@@ -231,7 +231,7 @@ impl Ending {
     fn words(&self) -> (Verdict, &'static str, String) {
         let no_worse = "no circle is worse than before.";
         match (&self.reason, &self.place) {
-            (Some(reason), _) if self.is_refused => (Verdict::Failed, "Not tuned:", format!("{reason}.")),
+            (Some(reason), _) if self.is_refused => (Verdict::Failed, "Not tuned:", reason.clone()),
             (Some(reason), _) => {
                 (Verdict::Failed, "Not better:", format!("{reason}. No machine file is written."))
             }
