@@ -192,7 +192,7 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
         } else {
             written.say(out)?;
         }
-        return CliError::all([written.outcome(Outcome::Failed), Err(failure)].into_iter());
+        return CliError::all([written.outcome(Outcome::Failed), Err(failure)]);
     }
     let Some(verification) = &work.verification else { return written.outcome(Outcome::Failed) };
     if arguments.json {
