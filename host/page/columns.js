@@ -3,10 +3,8 @@
 // A column shows the lowest and the highest value of the ticks it spans. Where a tick is wider than a column, a curve goes
 // straight from tick to tick.
 
+import { MARGIN } from "page/axes.js";
 import { work } from "page/work.js";
-
-/** Space around the area of a plot [px]. */
-export const MARGIN = { left: 66, right: 10, top: 6, bottom: 20 };
 
 export class Columns {
   /** Of plots whose area has a width [px] on a screen with `scale` pixels to each. */

@@ -51,3 +51,35 @@ export function marks(from, to, parts) {
   }
   return { values, decimals: Math.max(0, -Math.floor(Math.log10(step) + 1e-9)) };
 }
+
+/** With an exponent: 1.2·10⁻⁷. */
+export function scientific(value, digits) {
+  if (value === 0 || !Number.isFinite(value)) return figure(value, digits);
+  const exponent = Math.floor(Math.log10(Math.abs(value)) + 1e-12);
+  const superscript = String(exponent).replace(/[-0-9]/g, (c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]));
+  return `${figure(value / 10 ** exponent, digits)}·10${superscript}`;
+}
+
+/** A value as a cursor tells it: with an exponent where zeros would hide its digits. */
+export function reading(value, digits) {
+  const isSmall = value !== 0 && Math.abs(value) < 1e-4;
+  return isSmall || Math.abs(value) >= 1e7 ? scientific(value, digits) : figure(value, digits);
+}
+
+/** Marks of a logarithmic axis between two logarithms: 1, 2, 5, 10, …, or every decade; round steps where there are too few. */
+export function decades(from, to, parts) {
+  const [first, last] = [Math.floor(from), Math.ceil(to)];
+  const of = (steps) => {
+    const values = [];
+    for (let decade = first; decade <= last; decade += 1) {
+      for (const step of steps) {
+        const value = step * 10 ** decade;
+        if (Math.log10(value) >= from - 1e-9 && Math.log10(value) <= to + 1e-9) values.push(value);
+      }
+    }
+    return values;
+  };
+  const [fine, coarse] = [of([1, 2, 5]), of([1])];
+  if (fine.length < 3) return marks(10 ** from, 10 ** to, Math.min(6, parts));
+  return { values: fine.length <= parts ? fine : coarse, isOwn: true };
+}

@@ -1,8 +1,8 @@
 // The feed of the whole run, with the window of the plots on it.
 
-import { MARGIN } from "page/columns.js";
+import { MARGIN } from "page/axes.js";
 import { Sheet } from "page/sheet.js";
-import { wheelFactor } from "page/state.js";
+import { wheelFactor } from "page/span.js";
 import { ink } from "page/theme.js";
 import { work } from "page/work.js";
 

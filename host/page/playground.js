@@ -3,11 +3,13 @@
 // editor, sliders, dropped files ─► request ─► engine ─► answer ─► workbench
 
 import { Data, inflate, inflateBytes } from "page/data.js";
+import { complain, make } from "page/dom.js";
 import { Engine } from "page/engine.js";
+import { drawFigure } from "page/figures.js";
 import { figure } from "page/format.js";
 import { Sliders } from "page/sliders.js";
-import { cell, make, table } from "page/tables.js";
-import { complain, show } from "page/workbench.js";
+import { cell, table } from "page/tables.js";
+import { show } from "page/workbench.js";
 
 /** Time without a key until what was typed is run [ms]. */
 const TYPED_MS = 300;
@@ -28,6 +30,8 @@ class Playground {
     /** The machine as it was before edits that are still under way, and these. */
     this.base = machine.text;
     this.edits = [];
+    /** Figures of an experiment. */
+    this.figures = [];
     /** Answers shown, for tests. */
     this.shown = 0;
     /** Requests, and the latest of which an answer is shown. */
@@ -187,13 +191,18 @@ class Playground {
       this.shown += 1;
       return;
     }
+    for (const drawn of this.figures) drawn.end();
+    this.figures = [];
     const runs = [];
     if (inflated) runs.push({ data: new Data(inflated), program: null });
     if (request.do !== "ramp") this.takeMachine(request, header);
     if (request.do === "drive") {
       const { outcome, is_good: isGood } = header;
+      const drawings = make("div", { class: "drawings" });
       element("outcome").replaceChildren(make("p", { class: `result ${isGood ? "done" : "faulted"}` }, outcome));
-      headline.replaceChildren(...this.experiment(header));
+      headline.replaceChildren(...this.experiment(header), drawings);
+      // They are as wide as their place.
+      this.figures = header.figures.map((of) => drawFigure(drawings.appendChild(make("div")), of));
     } else if (request.do === "run") {
       runs[0].program = { text: request.program, times: header.times };
       headline.innerHTML = header.headline;

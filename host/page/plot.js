@@ -1,12 +1,11 @@
-// One pair of axes with curves, on canvas, with the values at the cursor above it.
+// A quantity of runs: its curves, limits and ceilings, what happened meanwhile, and the values at the cursor.
 
-import { MARGIN } from "page/columns.js";
-import { figure, fixed, marks, roundStep } from "page/format.js";
-import { Sheet, clearText } from "page/sheet.js";
+import { Axes, CURVE_WIDTH, LIMIT_SHOWN_FROM, MARGIN } from "page/axes.js";
+import { make } from "page/dom.js";
+import { figure } from "page/format.js";
+import { clearText } from "page/sheet.js";
 import { dashes, ink } from "page/theme.js";
 
-/** The part of its limit from which on a plot shows the limit; below it the curve would be flat. */
-const LIMIT_SHOWN_FROM = 0.2;
 /** How far above the highest feed a ceiling is drawn. */
 const CEILING_TO_FEED = 1.3;
 /** How much the range between lowest and highest values covers what lies below it. */
@@ -15,77 +14,38 @@ const RANGE_ALPHA = 0.6;
 const WORD_PX = 14;
 /** How much the curves of another run stand out. */
 const OTHER_ALPHA = 0.45;
-/** Width of a curve [px]. */
-const CURVE_WIDTH = 1.4;
 
-export class Plot {
+export class Plot extends Axes {
   /**
    * `title` is what it shows, `unit` in which unit, and `curves` what is drawn: each with `name`, `ink` and the `column` of the
    * quantity. `limit` is drawn in both directions where the curves come near it. `hasCeilings`: those of the feed, too.
    */
   constructor(state, parent, { title, unit, curves, limit = 0, hasCeilings = false, isTall = false }) {
-    Object.assign(this, { state, title, unit, curves, limit, hasCeilings });
-    this.element = parent.appendChild(document.createElement("figure"));
-    this.element.className = isTall ? "plot tall" : "plot";
-    const caption = this.element.appendChild(document.createElement("figcaption"));
-    caption.append(Object.assign(document.createElement("b"), { textContent: `${title} ` }), `[${unit}]`);
-    this.values = caption.appendChild(document.createElement("span"));
-    this.values.className = "values";
-    const area = this.element.appendChild(document.createElement("div"));
-    area.className = "area";
-    this.area = area;
-    this.sheet = new Sheet(area);
-    this.line = area.appendChild(document.createElement("i"));
-    this.line.className = "cursor";
+    super(parent, state, { title, unit, isTall });
+    Object.assign(this, { state, curves, limit, hasCeilings });
     this.isSeen = true;
-    for (const curve of curves) {
-      const entry = this.values.appendChild(document.createElement("span"));
-      entry.className = "value";
-      const key = entry.appendChild(document.createElement("i"));
-      key.style.setProperty("--key", `var(--${curve.ink})`);
-      if (curve.name) entry.append(`${curve.name} `);
-      curve.output = entry.appendChild(document.createElement("output"));
-    }
+    for (const curve of curves) curve.output = this.addValue(curve.name, curve.ink);
     if (hasCeilings) {
-      this.legend = this.element.appendChild(document.createElement("ul"));
-      this.legend.className = "legend";
+      this.legend = make("ul", { class: "legend" });
+      this.element.append(this.legend);
     }
-  }
-
-  /** Where x lies, in pixels from the left. */
-  px(x) {
-    const { from, to } = this.state;
-    return MARGIN.left + ((x - from) / (to - from)) * this.width;
-  }
-
-  /** x at so many pixels from the left of the plot's area. */
-  xAt(px) {
-    const { from, to } = this.state;
-    return from + ((px - MARGIN.left) / Math.max(1, this.width)) * (to - from);
   }
 
   draw(columns) {
-    const { width, height, scale } = this.sheet.clear();
-    this.width = width - MARGIN.left - MARGIN.right;
-    this.height = height - MARGIN.top - MARGIN.bottom;
-    if (this.width < 10 || this.height < 10) return;
-    this.scale = scale;
+    if (!this.begin()) return;
     const shapes = this.shapes(columns);
     const ceilings = this.hasCeilings ? columns.ceilings() : [];
     this.fit(shapes, ceilings);
     const { context } = this.sheet;
     this.drawRests(context);
     this.drawAxes(context);
-    context.save();
-    context.beginPath();
-    context.rect(MARGIN.left, MARGIN.top - 2, this.width, this.height + 4);
-    context.clip();
-    this.drawLimits(context);
-    this.drawCeilings(context, ceilings);
-    // The page's own run lies on top.
-    for (const shape of shapes.reverse()) this.drawShape(context, shape);
-    this.drawMarks(context);
-    context.restore();
+    this.clipped(context, () => {
+      if (this.showsLimit) this.drawLevels(context, [this.limit, -this.limit]);
+      this.drawCeilings(context, ceilings);
+      // The page's own run lies on top.
+      for (const shape of shapes.reverse()) this.drawShape(context, shape);
+      this.drawMarks(context);
+    });
     this.place();
   }
 
@@ -126,10 +86,6 @@ export class Plot {
     this.high = high > 0 || isPosition ? high + air : high;
   }
 
-  py(value) {
-    return MARGIN.top + ((this.high - value) / (this.high - this.low)) * this.height;
-  }
-
   drawRests(context) {
     const { state } = this;
     context.fillStyle = ink("rest");
@@ -139,58 +95,6 @@ export class Plot {
       const right = Math.min(MARGIN.left + this.width, Math.max(to, from + 1));
       if (right > left) context.fillRect(left, MARGIN.top, right - left, this.height);
     }
-  }
-
-  drawAxes(context) {
-    const { from, to } = this.state;
-    const bottom = MARGIN.top + this.height;
-    const hair = 1 / this.scale;
-    const snap = (px) => (Math.round(px * this.scale) + 0.5) / this.scale;
-    context.lineWidth = hair;
-    context.textBaseline = "middle";
-    context.textAlign = "right";
-    const rows = marks(this.low, this.high, this.height / 24);
-    for (const value of rows.values) {
-      const y = snap(this.py(value));
-      context.strokeStyle = ink(Math.abs(value) < 1e-12 ? "axis" : "grid");
-      context.beginPath();
-      context.moveTo(MARGIN.left, y);
-      context.lineTo(MARGIN.left + this.width, y);
-      context.stroke();
-      context.fillStyle = ink("soft");
-      context.fillText(label(value, rows), MARGIN.left - 6, y);
-    }
-    context.textAlign = "center";
-    const columns = marks(from, to, this.width / 90);
-    for (const value of columns.values) {
-      const x = snap(this.px(value));
-      context.strokeStyle = ink("grid");
-      context.beginPath();
-      context.moveTo(x, MARGIN.top);
-      context.lineTo(x, bottom);
-      context.stroke();
-      const text = label(value, columns);
-      const half = context.measureText(text).width / 2;
-      const right = MARGIN.left + this.width + MARGIN.right - half - 1;
-      context.fillStyle = ink("soft");
-      context.fillText(text, Math.min(right, x), bottom + 12);
-    }
-    context.strokeStyle = ink("axis");
-    context.strokeRect(snap(MARGIN.left), snap(MARGIN.top), this.width, this.height);
-  }
-
-  drawLimits(context) {
-    if (!this.showsLimit) return;
-    context.strokeStyle = ink("limit");
-    context.lineWidth = 1;
-    context.setLineDash(dashes("limit"));
-    for (const limit of [this.limit, -this.limit]) {
-      context.beginPath();
-      context.moveTo(MARGIN.left, this.py(limit));
-      context.lineTo(MARGIN.left + this.width, this.py(limit));
-      context.stroke();
-    }
-    context.setLineDash([]);
   }
 
   drawCeilings(context, steps) {
@@ -292,10 +196,7 @@ export class Plot {
   /** Moves the cursor's line to the cursor. */
   place() {
     const { state } = this;
-    const x = this.px(state.xOf(state.run, state.cursor));
-    const isIn = x >= MARGIN.left - 0.5 && x <= MARGIN.left + this.width + 0.5;
-    this.line.hidden = !isIn;
-    if (isIn) this.line.style.transform = `translateX(${x}px)`;
+    this.placeLine(state.xOf(state.run, state.cursor));
   }
 
   /** Writes the values at the cursor. */
@@ -315,9 +216,4 @@ export class Plot {
       curve.output.textContent = texts.filter((text) => text !== null).join(" | ");
     }
   }
-}
-
-function label(value, { decimals, values }) {
-  const step = values.length > 1 ? values[1] - values[0] : roundStep(Math.abs(value) || 1, 1);
-  return Math.abs(value) < 1e-9 * step ? "0" : fixed(value, decimals);
 }

@@ -1,14 +1,13 @@
 // The plots one above the other, with their common window, and what pointers, wheels and keys do to it.
 
-import { Columns, MARGIN } from "page/columns.js";
+import { MARGIN } from "page/axes.js";
+import { Columns } from "page/columns.js";
+import { listen, press } from "page/input.js";
 import { Overview } from "page/overview.js";
 import { Plot } from "page/plot.js";
-import { wheelFactor } from "page/state.js";
 import { onChange } from "page/theme.js";
 import { nextFrame } from "page/work.js";
 
-/** Time after a scroll of the page in which the wheel goes on scrolling it [ms]. */
-const SCROLL_GOES_ON_MS = 350;
 /** What there is to be drawn of a run. */
 function plotsOf(run) {
   const { axes, limits } = run.header;
@@ -49,7 +48,6 @@ export class Plots {
     this.element = document.getElementById("plots");
     this.plots = plotsOf(state.run).map((plot) => new Plot(state, this.element, plot));
     this.overview = new Overview(state, document.getElementById("overview"));
-    this.scrolledAt = -Infinity;
     this.redraw = () => this.draw();
     this.retell = () => this.tell();
     const seen = new IntersectionObserver((entries) => {
@@ -129,66 +127,18 @@ export class Plots {
 
   listen(plot) {
     const { state } = this;
-    const { area } = plot;
-    const fingers = new Map();
-    let drag = null;
-    const x = (event) => plot.xAt(event.clientX - area.getBoundingClientRect().left);
-    const tick = (event) => state.tickAt(state.run, x(event));
-    area.addEventListener("pointerdown", (event) => {
-      if (event.button > 1) return;
-      area.setPointerCapture(event.pointerId);
-      fingers.set(event.pointerId, event.clientX);
-      if (fingers.size === 2) {
-        drag = { pinch: spread(fingers), from: state.from, to: state.to, at: plot.xAt(middle(fingers) - area.getBoundingClientRect().left) };
-      } else if (event.shiftKey || event.button === 1) {
-        drag = { panFrom: event.clientX, from: state.from, to: state.to };
-        event.preventDefault();
-      } else {
-        drag = { isCursor: true };
-        state.place(tick(event));
-      }
-      this.element.focus({ preventScroll: true });
+    listen(plot.area, {
+      point: (px, _, isSet) => {
+        const tick = state.tickAt(state.run, plot.xAt(px));
+        if (isSet) state.place(tick);
+        else state.hover(tick);
+      },
+      leave: () => state.leave(),
+      pan: (px) => state.pan(-px / plot.width),
+      zoom: (px, _, factor) => state.zoom(plot.xAt(px), factor),
+      showAll: () => state.showAll(),
+      isWhole: () => state.isWhole(),
     });
-    area.addEventListener("pointermove", (event) => {
-      if (fingers.has(event.pointerId)) fingers.set(event.pointerId, event.clientX);
-      if (drag?.pinch) {
-        const factor = drag.pinch / Math.max(10, spread(fingers));
-        const width = (drag.to - drag.from) * factor;
-        const from = drag.at - ((drag.at - drag.from) / (drag.to - drag.from)) * width;
-        state.show(from, from + width);
-      } else if (drag?.panFrom !== undefined) {
-        const by = ((drag.panFrom - event.clientX) / plot.width) * (drag.to - drag.from);
-        state.show(drag.from + by, drag.to + by);
-      } else if (drag?.isCursor) {
-        state.place(tick(event));
-      } else if (event.pointerType === "mouse") {
-        state.hover(tick(event));
-      }
-    });
-    const end = (event) => {
-      fingers.delete(event.pointerId);
-      drag = null;
-    };
-    area.addEventListener("pointerup", end);
-    area.addEventListener("pointercancel", end);
-    area.addEventListener("pointerleave", () => drag || state.leave());
-    area.addEventListener("dblclick", () => state.showAll());
-    area.addEventListener("wheel", (event) => this.wheel(event, x(event)), { passive: false });
-  }
-
-  /** Zooms, or moves the window where the wheel goes sideways. A page that scrolls already goes on scrolling. */
-  wheel(event, x) {
-    const { state } = this;
-    const unit = event.deltaMode === 0 ? 1 : 33;
-    const [dx, dy] = [event.deltaX * unit, event.deltaY * unit];
-    const scrolls = performance.now() - this.scrolledAt < SCROLL_GOES_ON_MS || (dy > 0 && state.isWhole());
-    if (!event.ctrlKey && scrolls && Math.abs(dx) <= Math.abs(dy)) {
-      this.scrolledAt = performance.now();
-      return;
-    }
-    event.preventDefault();
-    if (Math.abs(dx) > Math.abs(dy)) state.pan(dx / 800);
-    else state.zoom(x, wheelFactor(dy));
   }
 
   key(event) {
@@ -200,7 +150,7 @@ export class Plots {
       const at = state.xOf(run, state.cursor);
       return at >= state.from && at <= state.to ? at : (state.from + state.to) / 2;
     };
-    const actions = {
+    press(event, {
       ArrowLeft: () => state.visit(state.cursor - step),
       ArrowRight: () => state.visit(state.cursor + step),
       Home: () => state.visit(0),
@@ -214,18 +164,6 @@ export class Plots {
       PageDown: () => state.pan(0.5),
       0: () => state.showAll(),
       Escape: () => state.showAll(),
-    };
-    if (!(event.key in actions) || event.ctrlKey || event.metaKey || event.altKey) return;
-    actions[event.key]();
-    event.preventDefault();
+    });
   }
 }
-
-const spread = (fingers) => {
-  const [a, b] = fingers.values();
-  return Math.abs(a - b);
-};
-const middle = (fingers) => {
-  const [a, b] = fingers.values();
-  return (a + b) / 2;
-};

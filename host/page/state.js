@@ -3,17 +3,11 @@
 // The plots lie over time or over path length; x is a time [s] or a path position [mm] accordingly. The cursor is a tick of the
 // page's own run.
 
-/** Zoom of a notch of the wheel, as a power of 2, and pixels of a notch. */
-const ZOOM_PER_NOTCH = 0.35;
-const NOTCH_PX = 100;
+import { Span } from "page/span.js";
 
-/** By how much a turn of the wheel widens the window. */
-export function wheelFactor(deltaPx) {
-  return 2 ** ((ZOOM_PER_NOTCH * deltaPx) / NOTCH_PX);
-}
-
-export class State {
+export class State extends Span {
   constructor(runs) {
+    super();
     this.runs = runs;
     this.run = runs[0];
     this.over = "time";
@@ -67,38 +61,15 @@ export class State {
     return to > from ? [from, to] : [from - 0.5, from + 0.5];
   }
 
-  isWhole() {
-    const [from, to] = this.ends();
-    return this.from <= from && this.to >= to;
-  }
-
-  showAll() {
-    [this.from, this.to] = this.ends();
-    this.tell("window");
-  }
-
-  /** Shows a window, moved to within the run, and no narrower than ten samples. */
-  show(from, to) {
+  /** No narrower than ten samples. */
+  least() {
     const [first, last] = this.ends();
-    const run = this.run;
-    const least = this.over === "time" ? 10 * run.ticksPerSample * run.tickS : (last - first) / run.samples;
-    const width = Math.min(last - first, Math.max(least, to - from));
-    const start = Math.min(last - width, Math.max(first, (from + to - width) / 2));
-    [this.from, this.to] = [start, start + width];
+    const { run } = this;
+    return this.over === "time" ? 10 * run.ticksPerSample * run.tickS : (last - first) / run.samples;
+  }
+
+  changed() {
     this.tell("window");
-  }
-
-  /** Zooms around x. */
-  zoom(x, factor) {
-    const width = (this.to - this.from) * factor;
-    const start = x - ((x - this.from) / (this.to - this.from)) * width;
-    this.show(start, start + width);
-  }
-
-  /** Moves the window by a part of its width. */
-  pan(part) {
-    const by = part * (this.to - this.from);
-    this.show(this.from + by, this.to + by);
   }
 
   /** Lies the plots over "time" or "path", with the same ticks in the window. */

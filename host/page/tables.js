@@ -1,16 +1,9 @@
 // What the page says in tables: worst places, time by reason, blocks, and two runs beside each other.
 
+import { make } from "page/dom.js";
 import { figure, fixed } from "page/format.js";
 
 const BLOCKS_PER_PAGE = 20;
-
-/** An element with attributes and children. */
-export function make(name, attributes = {}, ...children) {
-  const element = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
-  element.append(...children);
-  return element;
-}
 
 /** A table that scrolls by itself where the page is too narrow. Headings of words begin with a star; a name that is not ours
  * is a heading as it is, in a list of its own. */

@@ -20,6 +20,9 @@ export function dashes(name) {
   return (variable(`dash-${name}`) || "").split(" ").filter(Boolean).map((length) => Number(length) / 4);
 }
 
+/** How a key shows a line of an ink, or dots. */
+export const keyOf = (name, isDots = false) => (isDots ? "dots" : dashes(name).length ? "dashed" : "");
+
 /** A colour between those of the classes, slow to fast, for a part from 0 to 1. */
 export function shade(part) {
   const stops = [0, 1, 2, 3, 4, 5].map((i) => variable(`class-${i}`));

@@ -3,6 +3,7 @@
 // data ─► run ─► state: one cursor, one window ─► plots, path, code, tables
 
 import { Code } from "page/code.js";
+import { button, complain } from "page/dom.js";
 import { figure, fixed, span } from "page/format.js";
 import { PathView } from "page/path.js";
 import { Plots } from "page/plots.js";
@@ -63,33 +64,20 @@ function clear() {
   document.getElementById("readout").hidden = true;
 }
 
-/** Says what cannot be shown. */
-export function complain(words) {
-  const problem = document.getElementById("problem");
-  problem.hidden = false;
-  problem.textContent = words;
-}
-
 /** Time or path, zoom, the whole run. */
 function makeTools(state) {
   const tools = document.querySelector(".plots > .tools");
   const box = tools.appendChild(document.createElement("div"));
   box.className = "choice";
-  const button = (parent, text, label, act) => {
-    const made = parent.appendChild(document.createElement("button"));
-    made.type = "button";
-    made.textContent = text;
-    if (label) made.setAttribute("aria-label", label);
-    made.addEventListener("click", act);
-    return made;
-  };
   const over = { time: "Over time [s]", path: "Over path [mm]" };
   const buttonOf = {};
   const layOver = (name) => {
     state.layOver(name);
     for (const [of, made] of Object.entries(buttonOf)) made.setAttribute("aria-pressed", String(of === name));
   };
-  for (const [name, text] of Object.entries(over)) buttonOf[name] = button(box, text, "", () => layOver(name));
+  for (const [name, text] of Object.entries(over)) {
+    buttonOf[name] = box.appendChild(button(text, "", () => layOver(name)));
+  }
   layOver(state.over);
   const zoom = (factor) => () => {
     const at = state.xOf(state.run, state.cursor);
@@ -97,9 +85,8 @@ function makeTools(state) {
   };
   const buttons = tools.appendChild(document.createElement("div"));
   buttons.className = "choice";
-  button(buttons, "−", "Zoom out", zoom(2));
-  button(buttons, "+", "Zoom in", zoom(0.5));
-  button(buttons, "All", "The whole run", () => state.showAll());
+  buttons.append(button("−", "Zoom out", zoom(2)), button("+", "Zoom in", zoom(0.5)),
+    button("All", "The whole run", () => state.showAll()));
   const hint = tools.appendChild(document.createElement("span"));
   hint.className = "remark hint";
   hint.textContent = "Wheel or pinch zooms, shift-drag moves, a click sets the cursor.";

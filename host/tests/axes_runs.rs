@@ -162,7 +162,7 @@ fn a_report_names_all_axes_with_their_units() {
     let (summary, ticks, _) = run(&machine, &job);
     let trace = RunTrace { ticks, end: summary.end, ..job.info.empty_trace() };
     let mut page = Vec::new();
-    report::write_html(&trace, None, &mut page).expect("memory");
+    report::write_html(&trace, None, None, &mut page).expect("memory");
     let page = String::from_utf8(page).expect("UTF-8");
     for axis in &summary.axes {
         assert!(page.contains(&format!("<th scope=\"row\">{}</th>", axis.name)), "{}", axis.name);
@@ -183,7 +183,7 @@ fn rotary_axes_alone_make_a_report() {
     assert_eq!(summary.contour_error_um_max, 0.0);
     let trace = RunTrace { ticks, end: summary.end, ..job.info.empty_trace() };
     let mut page = Vec::new();
-    report::write_html(&trace, None, &mut page).expect("memory");
+    report::write_html(&trace, None, None, &mut page).expect("memory");
     let page = String::from_utf8(page).expect("UTF-8");
     assert!(page.contains("<th scope=\"row\">A</th>") && page.contains("Rotary axes"));
     assert!(!page.contains("ontour error"));

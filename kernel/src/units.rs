@@ -143,6 +143,7 @@ impl core::ops::Neg for Position {
 /// An encoder position in counts since power-up, extended to 64 bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[cfg_attr(feature = "link", derive(postcard_schema::Schema))]
 pub struct Counts(pub i64);
 
 /// A two's-complement code of a 16-bit ±10 V converter: −32768 is −10 V, 0 is 0 V, 32767 is one

@@ -8,7 +8,8 @@ import { Controls } from "page/panel/controls.js";
 import { Display } from "page/panel/display.js";
 import { Follower } from "page/panel/follow.js";
 import { Link } from "page/panel/link.js";
-import { complain, show } from "page/workbench.js";
+import { complain } from "page/dom.js";
+import { show } from "page/workbench.js";
 
 const NAMES = { program: "The program, as planned", capture: "Captured ticks" };
 

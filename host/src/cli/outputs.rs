@@ -10,7 +10,7 @@ use super::until_closed::UntilClosed;
 use crate::check;
 use crate::files::{Failure, Files, FilesError, OutputFile};
 use crate::planning::Plan;
-use crate::report::{self, PageRun};
+use crate::report::{self, Findings, PageRun};
 use crate::simulate::{Job, Observer, RunError, RunInfo, RunSummary};
 use crate::trace::mcap::McapTicks;
 use crate::trace::{RunTrace, TraceRow, TracedProgram};
@@ -94,6 +94,8 @@ pub(super) struct Outputs {
     program: Option<TracedProgram>,
     /// The run that the report shows beside it.
     against: Option<PageRun>,
+    /// What it shows below.
+    below: Option<Findings>,
 }
 
 /// Where a trace goes.
@@ -147,7 +149,15 @@ impl Outputs {
         };
         let mcap = open(files, "--mcap", of_trace.mcap.as_ref())?;
         let report = open(files, "--report", report)?;
-        Ok(Self { trace, of_trace: of_trace.clone(), mcap, report, program: None, against: None })
+        Ok(Self {
+            trace,
+            of_trace: of_trace.clone(),
+            mcap,
+            report,
+            program: None,
+            against: None,
+            below: None,
+        })
     }
 
     /// Where the rest of a command's output goes: to standard error, where the trace has standard output.
@@ -161,7 +171,7 @@ impl Outputs {
     /// Only the report; `role` names its option.
     pub(super) fn report(files: &mut Files, role: &'static str, path: PathBuf) -> Result<Self, FilesError> {
         let (of_trace, report) = (TraceArguments::default(), open(files, role, Some(&path))?);
-        Ok(Self { trace: None, of_trace, mcap: None, report, program: None, against: None })
+        Ok(Self { trace: None, of_trace, mcap: None, report, program: None, against: None, below: None })
     }
 
     /// With the program's text, and where the time of its plan goes.
@@ -173,6 +183,17 @@ impl Outputs {
     /// With another run beside it.
     pub(super) fn against(mut self, run: PageRun) -> Self {
         self.against = Some(run);
+        self
+    }
+
+    /// Whether a report was asked for.
+    pub(super) fn has_report(&self) -> bool {
+        self.report.is_some()
+    }
+
+    /// With findings below the run.
+    pub(super) fn below(mut self, findings: Findings) -> Self {
+        self.below = Some(findings);
         self
     }
 
@@ -226,8 +247,8 @@ impl Outputs {
             let named = (file.name().to_owned(), file.failure());
             (named, McapTicks::new(file, info))
         });
-        let (report, against) = (self.report, self.against);
-        let mut ticks = Ticks { trace, mcap, report, against, ticks: Vec::new() };
+        let (report, against, below) = (self.report, self.against, self.below);
+        let mut ticks = Ticks { trace, mcap, report, against, below, ticks: Vec::new() };
         let ran = run(&mut |tick| ticks.add(tick));
         Ok((ran, ticks))
     }
@@ -243,6 +264,7 @@ pub(super) struct Ticks<const N: usize> {
     mcap: Option<(TraceFile, io::Result<McapTicks<OutputFile, N>>)>,
     report: Option<OutputFile>,
     against: Option<PageRun>,
+    below: Option<Findings>,
     ticks: Vec<TraceRow<N>>,
 }
 
@@ -277,9 +299,10 @@ impl<const N: usize> Ticks<N> {
             let done = begun.and_then(McapTicks::finish).map_err(|source| failure.of(source));
             written.add("MCAP", name, done.and_then(OutputFile::commit));
         }
-        let (ticks, against) = (self.ticks, self.against);
-        written
-            .write("report", self.report, |file| report::write_html(&trace(ticks), against.as_ref(), file));
+        let (ticks, against, below) = (self.ticks, self.against, self.below);
+        written.write("report", self.report, |file| {
+            report::write_html(&trace(ticks), against.as_ref(), below, file)
+        });
         written
     }
 }

@@ -29,70 +29,104 @@ impl Display for Identification {
     }
 }
 
+/// A parameter in words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Described {
+    /// What it is.
+    pub name: &'static str,
+    /// Its value with interval and unit, or that it is not determined.
+    pub found: String,
+    /// What it was determined from, or would show in.
+    pub why: String,
+}
+
 impl Display for AxisParametersFound {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         writeln!(f, "Axis with its drive (per unit of the inertia moved), ± 95 % confidence:")?;
-        line(f, "command gain", self.command_gain, "", "travel of all runs")?;
-        offset(f, self.command_offset_mm_s)?;
-        line(f, "velocity gain Kv", self.velocity_gain_per_s, "1/s", "response to small steps")?;
-        line(
-            f,
-            "integral time Ti",
-            self.integral_time_s.times(1e3),
-            "ms",
-            "overshoot, recovery from friction",
-        )?;
-        line(f, "dead time τ", self.dead_time_s.times(1e3), "ms", "first motion after a command")?;
-        line(f, "current loop lag Tc", self.current_lag_s.times(1e3), "ms", "how motion sets in")?;
-        line(f, "command filter Tf", self.command_filter_s.times(1e3), "ms", "the first bend of a motion")?;
-        line(f, "total delay τ+Tf+Tc+T/2", self.total_delay_s.times(1e3), "ms", "all runs")?;
-        line(
-            f,
-            "acceleration limit",
-            self.accel_limit_mm_s2.times(1e-3),
-            "m/s²",
-            "runs that saturate the drive",
-        )?;
-        line(f, "Coulomb friction", self.coulomb_friction_mm_s2, "mm/s²", "reversals")?;
-        line(f, "viscous friction", self.viscous_friction_per_s, "1/s", "fast against slow motion")?;
-        match &self.bed {
-            None => writeln!(f, "  {:<22} none: a rigid bed explains the recordings as well", "machine bed"),
-            Some(bed) => bed_lines(f, bed),
+        for Described { name, found, why } in self.described() {
+            let line = format!("  {name:<22} {found:<26} {why}");
+            writeln!(f, "{}", line.trim_end())?;
         }
+        Ok(())
     }
 }
 
-fn bed_lines(f: &mut Formatter<'_>, bed: &BedEstimate) -> Result {
-    line(f, "bed frequency", bed.frequency_hz, "Hz", "ringing after steps, harmonic motion")?;
-    line(f, "bed damping", bed.damping_ratio.times(100.0), "%", "decay of that ringing")?;
-    line(f, "bed mass ratio", bed.mass_ratio, "", "size of that ringing")?;
-    writeln!(f, "  {:<22} {:>12.2} Hz", "machine resonance", bed.resonance_hz())
+impl AxisParametersFound {
+    /// All parameters in words.
+    #[must_use]
+    pub fn described(&self) -> Vec<Described> {
+        let ms = |estimate: Estimate| estimate.times(1e3);
+        let mut all = vec![
+            described("command gain", self.command_gain, "", "travel of all runs"),
+            offset(self.command_offset_mm_s),
+            described("velocity gain Kv", self.velocity_gain_per_s, "1/s", "response to small steps"),
+            described(
+                "integral time Ti",
+                ms(self.integral_time_s),
+                "ms",
+                "overshoot, recovery from friction",
+            ),
+            described("dead time τ", ms(self.dead_time_s), "ms", "first motion after a command"),
+            described("current loop lag Tc", ms(self.current_lag_s), "ms", "how motion sets in"),
+            described("command filter Tf", ms(self.command_filter_s), "ms", "the first bend of a motion"),
+            described("total delay τ+Tf+Tc+T/2", ms(self.total_delay_s), "ms", "all runs"),
+            described(
+                "acceleration limit",
+                self.accel_limit_mm_s2.times(1e-3),
+                "m/s²",
+                "runs that saturate the drive",
+            ),
+            described("Coulomb friction", self.coulomb_friction_mm_s2, "mm/s²", "reversals"),
+            described("viscous friction", self.viscous_friction_per_s, "1/s", "fast against slow motion"),
+        ];
+        match &self.bed {
+            None => all.push(Described {
+                name: "machine bed",
+                found: "none: a rigid bed explains the recordings as well".to_owned(),
+                why: String::new(),
+            }),
+            Some(bed) => all.extend(of_bed(bed)),
+        }
+        all
+    }
+}
+
+fn of_bed(bed: &BedEstimate) -> [Described; 4] {
+    [
+        described("bed frequency", bed.frequency_hz, "Hz", "ringing after steps, harmonic motion"),
+        described("bed damping", bed.damping_ratio.times(100.0), "%", "decay of that ringing"),
+        described("bed mass ratio", bed.mass_ratio, "", "size of that ringing"),
+        Described {
+            name: "machine resonance",
+            found: format!("{:.2} Hz", bed.resonance_hz()),
+            why: "from the bed".to_owned(),
+        },
+    ]
 }
 
 /// One parameter.
-fn line(f: &mut Formatter<'_>, name: &str, estimate: Estimate, unit: &str, from: &str) -> Result {
+fn described(name: &'static str, estimate: Estimate, unit: &str, from: &str) -> Described {
+    let Estimate { value, half_width_95 } = estimate;
+    let digits = decimals(half_width_95);
     if estimate.is_determined() {
-        let Estimate { value, half_width_95 } = estimate;
-        let digits = decimals(half_width_95);
-        let value = format!("{value:.digits$} ± {half_width_95:.digits$} {unit}");
-        return writeln!(f, "  {name:<22} {value:<26} from {from}");
+        let found = format!("{value:.digits$} ± {half_width_95:.digits$} {unit}");
+        return Described { name, found: found.trim_end().to_owned(), why: format!("from {from}") };
     }
     let upper = estimate.upper();
-    if upper.is_finite() && upper < 3.0 * estimate.value.abs().max(estimate.half_width_95) {
-        let digits = decimals(estimate.half_width_95);
-        let value = format!("not determined, ≤ {upper:.digits$} {unit}");
-        writeln!(f, "  {name:<22} {value:<26} would show in: {from}")
-    } else {
-        writeln!(f, "  {name:<22} {:<26} would show in: {from}", "not determined")
-    }
+    let is_bound = upper.is_finite() && upper < 3.0 * value.abs().max(half_width_95);
+    let bound = if is_bound { format!(", ≤ {upper:.digits$} {unit}") } else { String::new() };
+    Described { name, found: format!("not determined{bound}"), why: format!("would show in: {from}") }
 }
 
 /// The one quantity whose likeliest value is 0.
-fn offset(f: &mut Formatter<'_>, estimate: Estimate) -> Result {
+fn offset(estimate: Estimate) -> Described {
     let Estimate { value, half_width_95 } = estimate;
     let digits = decimals(half_width_95);
-    let value = format!("{value:.digits$} ± {half_width_95:.digits$} mm/s");
-    writeln!(f, "  {:<22} {value:<26} from drift at rest and in slow motion", "command offset")
+    Described {
+        name: "command offset",
+        found: format!("{value:.digits$} ± {half_width_95:.digits$} mm/s"),
+        why: "from drift at rest and in slow motion".to_owned(),
+    }
 }
 
 /// Decimals that show two digits of the interval.

@@ -64,6 +64,7 @@ mod fit;
 mod estimate;
 mod display;
 
+pub use display::Described;
 pub use error::IdentifyError;
 pub use estimate::{
     AxisParametersFound, BedEstimate, DETERMINED, Estimate, Figures, Identification, RunMatch,

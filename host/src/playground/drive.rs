@@ -8,20 +8,28 @@ use super::sliders::{self, SliderJson};
 use super::{Answer, Progress, Stage, Work};
 use crate::drive::circle::{self, CircleFigures};
 use crate::drive::circle_motion::{Circle, plane_of};
-use crate::drive::harmonic::{self, Response};
+use crate::drive::harmonic::{self, HarmonicFigures, Response};
 use crate::drive::identification::identify_axes;
+use crate::drive::inertia::{self, InertiaFigures};
 use crate::drive::reference::{BANDWIDTH_FEED_MM_S, CIRCLE_FEED_MM_S};
 use crate::drive::step::Step;
 use crate::drive::verification::{self, Verdict};
-use crate::drive::{AXES, DriveError, Terms, experiment, inertia};
+use crate::drive::{AXES, DriveError, Recording, Terms, experiment};
 use crate::gcode::{Axis, Plane};
 use crate::identify::Identification;
 use crate::machine::{AxisEdit, Machine, NumberEdit, edited, with_numbers};
-use crate::tuning::{self, propose};
+use crate::report::Figure;
+use crate::report::drive::{
+    Around, CIRCLE_LIMIT_UM, CircleSweep, TunedAxis, circle_around, circle_figures, harmonic_figures,
+    inertia_figure, step_figures, tune_figures,
+};
+use crate::tuning::{self, AxisTuning, propose};
 
 /// Frequencies of harmonic motion, of circles, and of motion under load \[Hz\]; the loads, as added inertia over the axis' own.
 const HARMONIC_HZ: [f64; 10] = [4.0, 8.0, 12.0, 16.0, 20.0, 24.0, 28.0, 32.0, 36.0, 40.0];
 const CIRCLES_HZ: [f64; 8] = [1.0, 2.0, 4.0, 6.0, 8.0, 10.0, 13.0, 16.0];
+/// Frequencies of which the error around the circle is drawn \[Hz\].
+const DRAWN_HZ: [f64; 2] = [4.0, 13.0];
 const LOADED_HZ: f64 = 8.0;
 const LOADS: [f64; 4] = [0.0, 0.5, 1.0, 2.0];
 
@@ -62,6 +70,7 @@ struct DriveJson {
     outcome: String,
     is_good: bool,
     tables: Vec<Table>,
+    figures: Vec<Figure>,
     /// The tuned machine's file.
     tuned: Option<String>,
 }
@@ -100,16 +109,26 @@ struct Bench {
     text: String,
     machine: Machine,
     tables: Vec<Table>,
+    figures: Vec<Figure>,
+    responses: Vec<HarmonicFigures>,
+    loads: Vec<(InertiaFigures, Recording)>,
+    sweeps: Vec<(&'static str, Vec<CircleFigures>)>,
+    /// Circles that are drawn.
+    shown: Vec<Around>,
     found: Vec<Identification>,
+    proposals: Vec<AxisTuning>,
     /// Text and machine after tuning.
     tuned: Option<(String, Machine)>,
     /// The acceleration that each axis bears \[mm/s²\].
     bears_mm_s2: [f64; AXES],
     /// Circles before tuning, or why they can't be driven.
-    before: Vec<Result<CircleFigures, String>>,
+    before: Vec<Result<Driven, String>>,
     worse: usize,
     compared: usize,
 }
+
+/// A circle's figures, and what is drawn of it.
+type Driven = (CircleFigures, Around);
 
 /// A run, or what is concluded from runs.
 type Piece = Box<dyn FnOnce(&mut Bench) -> Result<(), String>>;
@@ -149,7 +168,13 @@ pub(super) fn begin(request: DriveRequest) -> Result<Box<dyn Work>, String> {
         text,
         machine,
         tables: Vec::new(),
+        figures: Vec::new(),
+        responses: Vec::new(),
+        loads: Vec::new(),
+        sweeps: Vec::new(),
+        shown: Vec::new(),
         found: Vec::new(),
+        proposals: Vec::new(),
         tuned: None,
         bears_mm_s2: [f64::INFINITY; AXES],
         before: Vec::new(),
@@ -167,7 +192,7 @@ impl Work for Experimenting {
         if !self.pieces.is_empty() {
             return Ok(None);
         }
-        let Bench { text, machine, tables, tuned, worse, compared, .. } = &mut self.bench;
+        let Bench { text, machine, tables, figures, tuned, worse, compared, .. } = &mut self.bench;
         let is_verified = self.experiment != Experiment::Tune || *compared > 0;
         let is_good = *worse == 0 && is_verified;
         let outcome = match (self.experiment, is_good) {
@@ -185,6 +210,7 @@ impl Work for Experimenting {
             outcome,
             is_good,
             tables: std::mem::take(tables),
+            figures: std::mem::take(figures),
             tuned: tuned.take().filter(|_| is_good).map(|(text, _)| text),
         };
         Answer::new(&json, Vec::new()).map(Some)
@@ -219,7 +245,8 @@ fn told(error: DriveError) -> String {
 fn step(axis: usize) -> VecDeque<Piece> {
     let piece: Piece = Box::new(move |bench| {
         let step = Step { axis, ..Step::reference() };
-        let (figures, _) = step.measure(&bench.machine).map_err(told)?;
+        let (figures, response) = step.measure(&bench.machine).map_err(told)?;
+        bench.figures.extend(step_figures(&bench.machine, &step, &response, &figures).map(Figure::from));
         let title =
             format!("Step of {} to {:.0} mm/min, open loop", bench.axis_name(axis), 60.0 * step.feed_mm_s);
         bench.begin_table(title, &["*Figure", "Value", "*Unit"]);
@@ -264,10 +291,20 @@ fn harmonic(axis: usize) -> VecDeque<Piece> {
             let found = harmonic::measure(&experiment::open_loop(&bench.machine), &circle).map_err(told)?;
             let of_axis = found.axes.iter().find(|found| found.axis == axis).unwrap_or(&found.axes[0]);
             bench.row([Cell::Number(frequency_hz)].into_iter().chain(response(of_axis)).collect());
+            bench.responses.push(found);
             Ok(())
         })
     };
-    HARMONIC_HZ.into_iter().map(of_frequency).collect()
+    let draw: Piece = Box::new(move |bench| {
+        bench.figures.push(harmonic_figures(&bench.machine, &[axis], &bench.responses));
+        Ok(())
+    });
+    HARMONIC_HZ.into_iter().map(of_frequency).chain([draw]).collect()
+}
+
+/// The motion under load.
+fn loaded(axis: usize) -> Circle {
+    Circle { plane: plane_of(axis), ..Circle::new(LOADED_HZ, BANDWIDTH_FEED_MM_S) }
 }
 
 fn loads(axis: usize) -> VecDeque<Piece> {
@@ -289,17 +326,22 @@ fn loads(axis: usize) -> VecDeque<Piece> {
                     ],
                 );
             }
-            let circle = Circle { plane: plane_of(axis), ..Circle::new(LOADED_HZ, BANDWIDTH_FEED_MM_S) };
-            let (found, _) = inertia::measure(&bench.machine, &circle, axis, load).map_err(told)?;
+            let (found, recording) =
+                inertia::measure(&bench.machine, &loaded(axis), axis, load).map_err(told)?;
             let acceleration =
                 [found.peak_accel_mm_s2, found.plateau_accel_mm_s2].map(|a| Cell::Number(a / 1e3));
             let acts = words(if found.is_limited { "acts" } else { "–" });
             let row = [Cell::Number(load)].into_iter().chain(response(&found.response));
             bench.row(row.chain(acceleration).chain([acts]).collect());
+            bench.loads.push((found, recording));
             Ok(())
         })
     };
-    LOADS.into_iter().map(of_load).collect()
+    let draw: Piece = Box::new(move |bench| {
+        bench.figures.push(inertia_figure(&loaded(axis), &bench.loads).map_err(told)?.into());
+        Ok(())
+    });
+    LOADS.into_iter().map(of_load).chain([draw]).collect()
 }
 
 fn circles() -> VecDeque<Piece> {
@@ -324,15 +366,36 @@ fn circles() -> VecDeque<Piece> {
                 );
             }
             let machine = terms.of(&bench.machine);
-            let found = circle::measure(&machine, frequency_hz, CIRCLE_FEED_MM_S).map_err(told)?;
+            let circle = Circle::new(frequency_hz, CIRCLE_FEED_MM_S);
+            let recording = circle.record(&machine).map_err(told)?;
+            let found = circle::figures(&recording, &circle).map_err(told)?;
+            if DRAWN_HZ.contains(&frequency_hz) {
+                bench.shown.push(Around::of(terms.name(), &circle, &recording).map_err(told)?);
+            }
             let [x, y] = found.following_um;
             let row = [found.frequency_hz, found.radius_mm, found.contour_um(), found.form_um(), x, y];
             bench.row(row.map(Cell::Number).into());
+            match bench.sweeps.last_mut() {
+                Some((name, circles)) if *name == terms.name() => circles.push(found),
+                _ => bench.sweeps.push((terms.name(), vec![found])),
+            }
             Ok(())
         })
     };
+    let draw: Piece = Box::new(|bench| {
+        let sweeps: Vec<CircleSweep<'_>> =
+            bench.sweeps.iter().map(|(name, circles)| CircleSweep { name, circles }).collect();
+        bench.figures.push(circle_figures(&bench.machine, &sweeps, CIRCLE_LIMIT_UM).into());
+        bench.figures.extend(circle_around(&bench.machine, &bench.shown, CIRCLE_LIMIT_UM));
+        Ok(())
+    });
     let choices = [Terms::V, Terms::Va, Terms::AsIs];
-    choices.into_iter().flat_map(|terms| CIRCLES_HZ.map(|hz| (terms, hz))).map(of_circle).collect()
+    choices
+        .into_iter()
+        .flat_map(|terms| CIRCLES_HZ.map(|hz| (terms, hz)))
+        .map(of_circle)
+        .chain([draw])
+        .collect()
 }
 
 fn tune() -> VecDeque<Piece> {
@@ -344,7 +407,7 @@ fn tune() -> VecDeque<Piece> {
     };
     let before = |(plane, hz): (Plane, f64)| -> Piece {
         Box::new(move |bench| {
-            let found = driven(bench, &bench.machine, plane, hz);
+            let found = driven(bench, &bench.machine, plane, hz, "before");
             bench.before.push(found);
             Ok(())
         })
@@ -356,10 +419,17 @@ fn tune() -> VecDeque<Piece> {
     let of_plane = |plane: Plane| verification::VERIFIED_HZ.map(|hz| (plane, hz));
     let circles: Vec<(Plane, f64)> = verification::planes(&all).into_iter().flat_map(of_plane).collect();
     let propose: Piece = Box::new(proposed);
+    let draw: Piece = Box::new(|bench| {
+        let of = |(axis, (found, tuning))| TunedAxis { axis, found, tuning: Some(tuning) };
+        let axes: Vec<TunedAxis<'_>> = bench.found.iter().zip(&bench.proposals).enumerate().map(of).collect();
+        bench.figures = tune_figures(&bench.machine, &axes, &bench.shown);
+        Ok(())
+    });
     let pieces = (0..AXES).map(identify).chain([propose]);
     pieces
         .chain(circles.clone().into_iter().map(before))
         .chain(circles.into_iter().enumerate().map(after))
+        .chain([draw])
         .collect()
 }
 
@@ -369,21 +439,24 @@ fn driven(
     machine: &Machine,
     plane: Plane,
     frequency_hz: f64,
-) -> Result<CircleFigures, String> {
+    name: &str,
+) -> Result<Driven, String> {
     let [first, second, _] = plane.axes();
     let bears_mm_s2 = bench.bears_mm_s2[first].min(bench.bears_mm_s2[second]);
     let (circle, _) = verification::circle(plane, frequency_hz, &bench.machine, bears_mm_s2);
     let recording = circle.record(machine).map_err(told)?;
-    circle::figures(&recording, &circle).map_err(told)
+    let figures = circle::figures(&recording, &circle).map_err(told)?;
+    Ok((figures, Around::of(name, &circle, &recording).map_err(told)?))
 }
 
 /// The machine's file with the figures proposed, and tables of what was found and what is changed.
 fn proposed(bench: &mut Bench) -> Result<(), String> {
     let mut edits = Vec::with_capacity(AXES);
-    for (axis, found) in std::mem::take(&mut bench.found).into_iter().enumerate() {
-        bench.bears_mm_s2[axis] = verification::bears_mm_s2(&found).unwrap_or(f64::INFINITY);
+    let all_found = std::mem::take(&mut bench.found);
+    for (axis, found) in all_found.iter().enumerate() {
+        bench.bears_mm_s2[axis] = verification::bears_mm_s2(found).unwrap_or(f64::INFINITY);
         let settings = &bench.machine.axes[axis];
-        let proposal = propose(settings, &found, tuning::Method::Inverse, bench.machine.tick_s);
+        let proposal = propose(settings, found, tuning::Method::Inverse, bench.machine.tick_s);
         let proposal = proposal.map_err(|error| error.to_string())?;
         let title = format!("Axis {}", bench.axis_name(axis));
         bench.begin_table(title, &["*Key", "Before", "After", "*Unit", "*Because"]);
@@ -403,7 +476,9 @@ fn proposed(bench: &mut Bench) -> Result<(), String> {
         }
         let (gains, feedforward) = (proposal.gains, proposal.feedforward);
         edits.push(AxisEdit { axis, gains, feedforward, output_offset_v: proposal.output_offset_v });
+        bench.proposals.push(proposal);
     }
+    bench.found = all_found;
     let text = edited(&bench.machine_name, &bench.text, &edits).map_err(|error| error.to_string())?;
     // Verified is exactly what the file says.
     let machine = Machine::from_toml(&bench.machine_name, &text).map_err(|error| error.to_string())?;
@@ -414,14 +489,15 @@ fn proposed(bench: &mut Bench) -> Result<(), String> {
 /// A circle after tuning, beside the one before.
 fn compare(bench: &mut Bench, index: usize, plane: Plane, frequency_hz: f64) -> Result<(), String> {
     let Some((_, tuned)) = &bench.tuned else { return Ok(()) };
-    let after = driven(bench, tuned, plane, frequency_hz);
+    let after = driven(bench, tuned, plane, frequency_hz, "after");
     let axes = [plane.axes()[0], plane.axes()[1]];
     let [first, second] = axes.map(|axis| bench.axis_name(axis));
     let title = format!("Circles of {first} and {second}, before and after");
     let verdict = Verdict { machine: tuned, is_tuned: [true; 2] };
     let (row, is_worse) = match (&bench.before[index], after) {
-        (Ok(before), Ok(after)) => {
+        (Ok((before, around)), Ok((after, around_after))) => {
             bench.compared += 1;
+            bench.shown.extend([around.clone(), around_after]);
             let is_worse = !verdict.is_no_worse(before, &after);
             let of = |circle: &CircleFigures| (circle.contour_um(), circle.form_um());
             let ((contour, form), (contour_after, form_after)) = (of(before), of(&after));

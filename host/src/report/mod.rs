@@ -6,30 +6,32 @@
 //! with the number of ticks; the size of the page has a bound, and what is told less closely for it is said. Fails
 //! only if the output cannot be written.
 //!
-//! Reports of experiments ([`drive`], [`smoothness`]) are pictures between words.
+//! Reports of experiments ([`drive`], [`smoothness`]) are [`Findings`]s: words, tables, and figures that the same script draws.
 
-#[cfg(feature = "terminal")]
-mod decimate;
-#[cfg(feature = "terminal")]
 pub mod drive;
+pub mod figure;
 mod format;
 pub mod page;
 #[cfg(test)]
 pub(crate) use page::reading;
 mod palette;
 #[cfg(feature = "terminal")]
-mod plots;
+mod picture;
+mod findings;
 #[cfg(feature = "terminal")]
 pub mod smoothness;
+#[cfg(feature = "terminal")]
+pub mod spline;
 mod summary;
 mod tables;
 
 use std::io::{self, Write};
 
+pub use self::figure::{Figure, Stack};
+pub use self::findings::{Findings, Verdict};
 pub use self::page::PageRun;
 
 use self::format::{counted, duration, escape, figure};
-use self::palette::Ink;
 use self::summary::{Outcome, Summary};
 use crate::trace::{RunTrace, TracedCommand, TracedFault};
 
@@ -39,7 +41,8 @@ const FAULTS_IN_SENTENCE: usize = 3;
 /// Notices shown.
 const NOTICES_MAX: usize = 100;
 
-/// Writes the report of `trace` as one self-contained HTML file, with another run's curves beside it if there is one.
+/// Writes the report of `trace` as one self-contained HTML file, with another run's curves beside it, and findings below it, if there
+/// are such.
 ///
 /// An empty trace, a run of one tick and values that are not finite all make a valid page that says so.
 ///
@@ -49,10 +52,11 @@ const NOTICES_MAX: usize = 100;
 pub fn write_html<const N: usize>(
     trace: &RunTrace<N>,
     against: Option<&PageRun>,
+    below: Option<Findings>,
     out: &mut impl Write,
 ) -> io::Result<()> {
     let summary = Summary::of(trace);
-    page::write(trace, &summary, &headline(trace, &summary), against, out)
+    page::write(trace, &summary, &headline(trace, &summary), against, below, out)
 }
 
 /// What a page shows of a run: what it came to in words and tables, as HTML, and its data.
@@ -86,19 +90,6 @@ fn axis_names<const N: usize>(trace: &RunTrace<N>) -> Vec<String> {
         name => name.to_string(),
     };
     trace.axes.iter().map(|axis| axis.name.trim()).enumerate().map(name).collect()
-}
-
-/// Everything before what the page has to say about `subject`.
-fn head(subject: &str, out: &mut impl Write) -> io::Result<()> {
-    writeln!(
-        out,
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n\
-         <title>{} – motion report</title>\n<style>\n{}{}</style></head>\n<body><main>",
-        escape(subject),
-        include_str!("style.css"),
-        palette::style_sheet(),
-    )
 }
 
 fn program_name<const N: usize>(trace: &RunTrace<N>) -> &str {
@@ -210,33 +201,6 @@ fn command_word(command: &TracedCommand) -> String {
 struct View {
     right: usize,
     up: usize,
-}
-
-/// A figure with its legend and its caption.
-fn figure_html(
-    drawing: &str,
-    legend: &[(Ink, String)],
-    caption: &str,
-    out: &mut impl Write,
-) -> io::Result<()> {
-    writeln!(out, "<figure>\n{drawing}")?;
-    if !legend.is_empty() {
-        writeln!(out, "<ul class=\"legend\">")?;
-        for (ink, word) in legend {
-            let line = "<path d=\"M0 24H136\" fill=\"none\" stroke-width=\"12\"";
-            writeln!(
-                out,
-                "<li><svg viewBox=\"0 0 136 48\" aria-hidden=\"true\">{line} stroke=\"{}\"/></svg>{}</li>",
-                ink.hex(),
-                escape(word)
-            )?;
-        }
-        writeln!(out, "</ul>")?;
-    }
-    if !caption.is_empty() {
-        writeln!(out, "<figcaption>{caption}</figcaption>")?;
-    }
-    writeln!(out, "</figure>")
 }
 
 /// The planes in which there is something to see, of linear axes: of two that moved theirs, of more the first with each

@@ -1,12 +1,8 @@
 //! One colour per idea, on light and on dark paper.
 //!
-//! The plots are drawn in the light colours; the style sheet generated here replaces them by their dark
-//! partners. A drawn colour is therefore also a name and must be unique. Lines keep a contrast of at least
-//! 3:1 to the paper, text of at least 4.5:1, and where several lines share a plot they also differ in their
-//! dashes.
-
-#[cfg(feature = "terminal")]
-use plotters::style::RGBColor;
+//! Pages have the inks as variables of their style sheet, by name; pictures of documents have the light colours. A colour
+//! stands for one ink and must be unique. Lines keep a contrast of at least 3:1 to the paper, text of at least 4.5:1, and
+//! where several lines share a plot they also differ in their dashes.
 
 /// A colour on light and on dark paper, and the dashes of a line drawn in it (empty: solid).
 #[derive(Clone, Copy, Debug)]
@@ -25,22 +21,22 @@ const fn dashed(light: u32, dark: u32, dash: &'static str) -> Ink {
 }
 
 impl Ink {
-    /// The colour to draw with.
-    #[cfg(feature = "terminal")]
-    pub(super) fn rgb(self) -> RGBColor {
-        let [_, r, g, b] = self.light.to_be_bytes();
-        RGBColor(r, g, b)
-    }
-
     /// What a page calls it.
     pub(super) fn name(self) -> String {
         let name = named().find(|(_, ink)| ink.light == self.light).map(|(name, _)| name);
         name.unwrap_or_default()
     }
 
-    /// The same as the drawing library writes it, `#RRGGBB`.
+    /// The colour on light paper, as pictures and style sheets write it.
+    #[cfg(any(test, feature = "terminal"))]
     pub(super) fn hex(self) -> String {
-        format!("#{:06X}", self.light)
+        format!("#{:06x}", self.light)
+    }
+
+    /// The dashes and gaps of its lines; empty for a solid one.
+    #[cfg(feature = "terminal")]
+    pub(super) fn dash(self) -> &'static str {
+        self.dash
     }
 }
 
@@ -181,36 +177,13 @@ pub(super) fn variables() -> String {
     )
 }
 
-fn inks() -> impl Iterator<Item = Ink> {
-    named().map(|(_, ink)| ink)
-}
-
-/// Rules that put its dashes on every line drawn in an ink of `inks`.
-fn dashes(inks: impl Iterator<Item = Ink>) -> String {
-    let rule = |ink: Ink| format!("svg [stroke=\"{}\"]{{stroke-dasharray:{}}}\n", ink.hex(), ink.dash);
-    inks.filter(|ink| !ink.dash.is_empty()).map(rule).collect()
-}
-
-/// Rules for a picture of its own, on white paper: the dashes of limits and of [`SERIES`].
-pub(super) fn picture_style_sheet() -> String {
-    dashes(SERIES.into_iter().chain([LIMIT]))
-}
-
-/// Rules that put every ink on dark paper, and its dashes on every line drawn in it.
-pub(super) fn style_sheet() -> String {
-    let dashes = dashes(inks());
-    let mut dark = String::new();
-    for ink in inks() {
-        let hex = ink.hex();
-        dark.push_str(&format!("svg [stroke=\"{hex}\"]{{stroke:#{:06X}}}", ink.dark));
-        dark.push_str(&format!("svg [fill=\"{hex}\"]{{fill:#{:06X}}}\n", ink.dark));
-    }
-    format!("{dashes}@media screen and (prefers-color-scheme:dark){{\n{dark}}}\n")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn inks() -> impl Iterator<Item = Ink> {
+        named().map(|(_, ink)| ink)
+    }
 
     fn luminance(colour: u32) -> f64 {
         let [_, r, g, b] = colour.to_be_bytes();

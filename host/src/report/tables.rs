@@ -54,6 +54,28 @@ fn wrapped(name: &str, head: &[&str], body: &str) -> String {
     table
 }
 
+/// A table whose first column names the row. Headings and cells are words of anyone's.
+pub(super) fn of_rows(name: &str, headings: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
+    let escaped: Vec<String> = headings.iter().map(|heading| escape(heading)).collect();
+    let head: Vec<&str> = escaped.iter().map(String::as_str).collect();
+    let mut body = String::new();
+    for row in rows {
+        body.push_str("<tr>");
+        for (index, cell) in row.iter().enumerate() {
+            let cell = escape(cell);
+            let _ = match headings.get(index) {
+                _ if index == 0 => write!(body, "<th scope=\"row\">{cell}</th>"),
+                Some(heading) if heading.starts_with('*') => {
+                    write!(body, "<td class=\"word long\">{cell}</td>")
+                }
+                _ => write!(body, "<td>{cell}</td>"),
+            };
+        }
+        body.push_str("</tr>\n");
+    }
+    wrapped(&escape(name), &head, &body)
+}
+
 /// Blocks at whose end the machine stands.
 pub(super) fn full_stops<const N: usize>(trace: &RunTrace<N>) -> usize {
     trace.blocks.iter().filter(|block| block.exit_mm_s <= 0.0).count()

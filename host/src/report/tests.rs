@@ -126,7 +126,7 @@ fn sample(tick_s: f64, with_z: bool) -> RunTrace {
 
 fn written(trace: &RunTrace, against: Option<&PageRun>) -> String {
     let mut out = Vec::new();
-    write_html(trace, against, &mut out).expect("writing to memory");
+    write_html(trace, against, None, &mut out).expect("writing to memory");
     let page = String::from_utf8(out).expect("UTF-8");
     assert!(page.starts_with("<!DOCTYPE html>") && page.trim_end().ends_with("</html>"));
     // It needs nothing from elsewhere. Data are long lines of any letters, and an icon of nothing asks for none.
@@ -296,7 +296,7 @@ fn text_from_the_program_cannot_become_markup() {
         detail: hostile.to_string(),
     });
     let mut out = Vec::new();
-    write_html(&trace, None, &mut out).expect("writing to memory");
+    write_html(&trace, None, None, &mut out).expect("writing to memory");
     let page = String::from_utf8(out).expect("UTF-8");
     assert!(!page.contains("<script>") && page.contains("&lt;script&gt;") && page.contains("axis 2"));
     let program = Read::text(&page, "program");

@@ -56,6 +56,12 @@ impl Margins {
         margins
     }
 
+    /// The additional delay that the loop bears \[s\]: its phase margin at its crossover.
+    #[must_use]
+    pub fn delay_s(&self) -> f64 {
+        self.phase_deg / 360.0 / self.crossover_hz
+    }
+
     /// Whether a closed loop with these margins is stable: true if the gain may grow and the phase may lag.
     #[must_use]
     pub fn is_stable(&self) -> bool {
@@ -63,8 +69,9 @@ impl Margins {
     }
 }
 
-/// L at a frequency.
-fn open_loop(drive: &DriveParameters, kp_per_s: f64, tick_s: f64, frequency_hz: f64) -> Complex {
+/// The position loop L = kp·G/s at a frequency.
+#[must_use]
+pub fn open_loop(drive: &DriveParameters, kp_per_s: f64, tick_s: f64, frequency_hz: f64) -> Complex {
     let s = Complex::new(0.0, TAU * frequency_hz);
     Complex::new(kp_per_s, 0.0) * response(drive, tick_s, frequency_hz) / s
 }

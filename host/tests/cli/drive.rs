@@ -3,7 +3,7 @@
 use motion_host::machine::Machine;
 use serde_json::Value;
 
-use super::workspace::{Workspace, assert_has, number};
+use super::workspace::{Workspace, assert_has, assert_points, number, points};
 
 #[test]
 fn drive_compares_regulators() {
@@ -11,8 +11,7 @@ fn drive_compares_regulators() {
     let arguments = ["drive", "compare", "--from", "5", "--to", "5", "--resolutions-um", "1"];
     let text = workspace.stdout(&[&arguments[..], &["--report", "compare.html"]].concat());
     assert!(text.contains("stringer.ngc") && text.contains("P + inverse with preview"), "{text}");
-    let page = workspace.read("compare.html");
-    assert!(page.contains("<svg") && !page.contains("NaN") && page.trim_end().ends_with("</html>"));
+    let figures = workspace.figures("compare.html");
     let json = workspace.json(&[&arguments[..], &["--json"]].concat());
     assert_has(&json["fitted"][2], &["axis", "ff1", "ff2_s", "ff3_s2"]);
     let rows = json["regulators"].as_array().expect("a list");
@@ -20,6 +19,12 @@ fn drive_compares_regulators() {
     let keys = ["following_error_um", "contour_error_um", "output_noise_mv", "current_noise_percent"];
     assert_has(&rows[1]["motions"][2], &keys);
     assert_has(&json["sweeps"][6]["circles"][0], &keys);
+    for (graph, key) in ["contour_error_um", "following_error_um"].into_iter().enumerate() {
+        for sweep in json["sweeps"].as_array().expect("a list") {
+            let drawn = points(&figures[0], graph, sweep["name"].as_str().expect("a name"));
+            assert_points(&drawn, [(5.0, number(&sweep["circles"][0][key]))].into_iter());
+        }
+    }
     for wrong in ["0", "-1", "nan", "1001"] {
         let refusal = workspace.refusal(&["drive", "compare", &format!("--resolutions-um={wrong}")]);
         assert!(refusal.contains("found set-point resolutions [") && refusal.contains("expected 1 to 10"));
@@ -90,7 +95,38 @@ fn drive_prints_its_keys() {
     for report in ["step.html", "inertia.html", "circle.html", "bode.html"] {
         let page = workspace.read(report);
         assert!(page.starts_with("<!DOCTYPE html>") && page.trim_end().ends_with("</html>"), "{report}");
-        assert!(page.contains("<svg") && !page.contains("NaN"), "{report}");
+        assert!(page.contains("class=\"result done\""), "{report}");
+    }
+    // What is drawn is what is told.
+    let drawn = &workspace.figures("circle.html")[0];
+    for sweep in circle["feedforward"].as_array().expect("a list") {
+        let name = sweep["name"].as_str().expect("a name");
+        let over = |key: &str| -> Vec<(f64, f64)> {
+            let circles = sweep["circles"].as_array().expect("a list").iter();
+            circles.map(|circle| (number(&circle["frequency_hz"]), number(&circle[key]))).collect()
+        };
+        let contour = [("greatest", "contour_error_um_max"), ("least", "contour_error_um_min")];
+        for (end, key) in contour {
+            assert_points(&points(drawn, 0, &format!("{name}, {end}")), over(key).into_iter());
+        }
+        assert_points(&points(drawn, 1, name), over("form_deviation_um").into_iter());
+        assert_points(&points(drawn, 2, name), over("following_error_x_um").into_iter());
+    }
+    let drawn = &workspace.figures("bode.html")[0];
+    assert_eq!(drawn["is_logarithmic"], true);
+    let of = |value: &dyn Fn(&Value) -> f64| -> Vec<(f64, f64)> {
+        let points = bode["points"].as_array().expect("a list").iter();
+        points.map(|point| (number(&point["frequency_hz"]), value(point))).collect()
+    };
+    for (name, ratio, phase) in [
+        ("spectrum of the step", "step_ratio", "step_phase_deg"),
+        ("harmonics, fundamental", "fundamental_ratio", "harmonic_phase_deg"),
+        ("linear model", "linear_ratio", "linear_phase_deg"),
+    ] {
+        let db = of(&|point| 20.0 * number(&point[ratio]).log10());
+        let near = |(a, b): ((f64, f64), (f64, f64))| (a.1 - b.1).abs() < 1e-9;
+        assert!(points(drawn, 0, name).into_iter().zip(db).all(near), "{name}");
+        assert_points(&points(drawn, 1, name), of(&|point| number(&point[phase])).into_iter());
     }
 }
 
@@ -128,7 +164,9 @@ fn drive_refuses_what_cannot_be_done() {
 #[test]
 fn drive_tune_writes_what_it_has_verified() {
     let workspace = Workspace::new("tune");
-    let json = workspace.json(&["drive", "tune", "--axis", "x,Y", "--output", "tuned.toml", "--json"]);
+    let tune = ["drive", "tune", "--axis", "x,Y", "--output", "tuned.toml", "--report", "t.html", "--json"];
+    let json = workspace.json(&tune);
+    assert_tuning_is_drawn(&workspace, &json);
     assert_has(&json, &["axes", "learning", "output", "reason", "verification"]);
     assert!(json["learning"].is_null() && json["reason"].is_null());
     assert!(json["verification"]["not_driven"].as_array().expect("a list").is_empty(), "{json}");
@@ -195,6 +233,7 @@ fn drive_tune_writes_what_it_has_verified() {
     assert!(contours.len() == 3 && contours[0] > 10.0 && contours[2] < 2.5, "{contours:?}");
 
     let worse = ["drive", "tune", "--machine", "tuned.toml", "--method", "series", "--output", "worse.toml"];
+    let worse = [&worse[..], &["--report", "worse.html"]].concat();
     let output = workspace.motion(&worse);
     assert_eq!(output.status.code(), Some(1));
     let said = String::from_utf8_lossy(&output.stdout);
@@ -205,6 +244,10 @@ fn drive_tune_writes_what_it_has_verified() {
         "{said}"
     );
     assert!(!workspace.0.join("worse.toml").exists());
+    let page = workspace.read("worse.html");
+    let red = "class=\"result faulted\"><strong>Not better:</strong> the circle at ";
+    assert!(page.contains(red) && page.contains("<td class=\"word long\">worse</td>"), "{page}");
+    assert!(page.contains("No machine file is written."), "{page}");
 
     // Before the work, and so before a file is made.
     for (arguments, words) in [
@@ -220,6 +263,87 @@ fn drive_tune_writes_what_it_has_verified() {
     assert!(refusal.contains("found axis W, expected the name of an axis of the machine"), "{refusal}");
     let refusal = workspace.refusal(&["drive", "tune", "--machine", "missing.toml"]);
     assert!(refusal.contains("missing.toml"), "{refusal}");
+}
+
+/// The page shows what was found, proposed and verified.
+fn assert_tuning_is_drawn(workspace: &Workspace, json: &Value) {
+    let page = workspace.read("t.html");
+    assert!(page.contains("class=\"result done\"><strong>Tuned:</strong>"), "{page}");
+    assert!(page.contains("The machine file is written to tuned.toml."), "{page}");
+    let shown = |words: &str| {
+        let escaped = words.replace('\'', "&#39;");
+        assert!(page.contains(&escaped), "{words}");
+    };
+    for axis in json["axes"].as_array().expect("a list") {
+        for change in axis["changes"].as_array().expect("a list") {
+            shown(change["reason"].as_str().expect("words"));
+        }
+        for margin in ["phase margin", "gain margin", "delay margin", "crossover"] {
+            shown(margin);
+        }
+    }
+    shown("not determined");
+    let figures = workspace.figures("t.html");
+    let titles: Vec<&str> = figures.iter().map(|figure| figure["title"].as_str().expect("a title")).collect();
+    // Of each axis two, and of each circle two.
+    let circles = json["verification"]["circles"].as_array().expect("a list");
+    assert_eq!(figures.len(), 2 * 2 + 2 * circles.len(), "{titles:?}");
+    assert_eq!(titles[..2], ["Drive of X", "Position loop of X, opened"]);
+    let [model, measured] = ["model", "measured"].map(|name| points(&figures[0], 0, name));
+    assert!(model.len() > 100 && measured.len() > 5);
+    for (hz, db) in measured {
+        let (_, of_model) =
+            model.iter().min_by(|a, b| (a.0 - hz).abs().total_cmp(&(b.0 - hz).abs())).expect("one");
+        assert!((db - of_model).abs() < 0.5, "{hz} Hz: {db} dB is measured, {of_model} dB has the model");
+    }
+    // The position loop has its margins there.
+    let crossover_hz = number(&json["axes"][0]["margins"]["crossover_hz"]);
+    let amplitude = points(&figures[1], 0, "after");
+    let below = amplitude.iter().find(|(_, db)| *db < 0.0).expect("a crossover").0;
+    assert!((below / crossover_hz - 1.0).abs() < 0.03, "{below} {crossover_hz}");
+    let polars: Vec<&Value> = figures.iter().filter(|figure| figure["kind"] == "polar").collect();
+    assert_eq!(polars.len(), circles.len());
+    for (polar, circle) in polars.into_iter().zip(circles) {
+        assert_eq!(polar["axes"], circle["axes"]);
+        for name in ["before", "after"] {
+            let most = points(polar, 0, name).into_iter().map(|(_, um)| um.abs()).fold(0.0, f64::max);
+            let told = number(&circle[name]["contour_error_um"]);
+            // One revolution of those of a second.
+            assert!(most <= told + 1e-9 && most > 0.5 * told, "{most} {told} {circle}");
+        }
+    }
+}
+
+/// A recording that tells too little is refused in words, in red, with what it did tell.
+#[test]
+fn drive_tune_reports_its_refusal() {
+    let workspace = Workspace::new("tune-refused");
+    workspace.put("gentle.ngc", "G21 G90 F300\nG4 P0.3\nG1 Y2\nG4 P0.3\nG1 Y0\nG4 P0.3\nM2\n");
+    workspace.stdout(&["run", "gentle.ngc", "--record", "gentle.mrec"]);
+    let tune = ["drive", "tune", "--axis", "Y", "--from", "gentle.mrec", "--output", "t.toml"];
+    let (json, error) = workspace.ending(1, &[&tune[..], &["--report", "r.html", "--json"]].concat());
+    let json: Value = serde_json::from_str(&json).expect("JSON");
+    let reason = json["reason"].as_str().expect("words");
+    assert!(reason.contains("tuning of axis Y: found ") && error.contains(reason), "{reason} {error}");
+    assert!(json["axes"].as_array().expect("a list").is_empty() && !workspace.0.join("t.toml").exists());
+    let page = workspace.read("r.html");
+    let red = "class=\"result faulted\"><strong>Not tuned:</strong> tuning of axis Y: found ";
+    assert!(page.contains(red) && page.contains("velocity gain Kv"), "{page}");
+    assert_eq!(workspace.figures("r.html").len(), 1, "the drive as it was found");
+    // Where nothing was found, the page says why; what is no recording leaves the page that was there.
+    let still: String = (0..100).map(|tick| format!("{},{},7\n", f64::from(tick) * 5e-4, tick % 2)).collect();
+    workspace.put("still.csv", &format!("time_s,command_v,counts\n{still}"));
+    let tune = ["drive", "tune", "--axis", "Y", "--report", "r.html", "--from"];
+    let (said, _) = workspace.ending(1, &[&tune[..], &["still.csv"]].concat());
+    assert!(said.contains("report written to r.html"), "{said}");
+    let page = workspace.read("r.html");
+    assert!(
+        page.contains("<strong>Not tuned:</strong>") && page.contains("the encoder connected?<"),
+        "{page}"
+    );
+    workspace.put("bad.csv", "time_s,command_v,counts\n0,0,0\n0.0005,0,what\n");
+    workspace.refusal(&[&tune[..], &["bad.csv"]].concat());
+    assert_eq!(workspace.read("r.html"), page);
 }
 
 /// One axis alone is judged by its own error, in a plane that it moves in: beside an untuned one the contour

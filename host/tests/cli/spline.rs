@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::workspace::{Workspace, assert_has, keys, number};
+use super::workspace::{self, Workspace, assert_has, keys, number};
 
 /// Points of two turns of a curve in space, `count` of them.
 fn points(count: u32) -> String {
@@ -55,6 +55,19 @@ fn spline_runs_points() {
             && page.trim_end().ends_with("</html>")
     );
     assert!(workspace.read("run.csv").starts_with("tick,t_s,s_mm,"));
+    // The points, and how far the spline is from them.
+    let near = [&near[..], &["--report", "near.html"]].concat();
+    let spline = &workspace.json(&near)["spline"];
+    let figures = workspace.figures("near.html");
+    let kinds: Vec<&Value> = figures.iter().map(|figure| &figure["kind"]).collect();
+    assert_eq!(kinds, ["plane", "plane", "stack"]);
+    assert_eq!(figures[0]["points"]["points"].as_array().map(Vec::len), Some(200));
+    assert_eq!(figures[0]["told"][0]["values"][3], 5.0, "the heading is line 1");
+    let over_path = workspace::points(&figures[2], 0, "");
+    let most_um = over_path.iter().map(|(_, um)| *um).fold(0.0, f64::max);
+    assert!((most_um / 1e3 / number(&spline["deviation_mm"]) - 1.0).abs() < 1e-9, "{most_um}");
+    let (length_mm, _) = over_path[199];
+    assert!((length_mm - number(&spline["length_mm"])).abs() < 1e-9, "{length_mm}");
 }
 
 #[test]
@@ -74,9 +87,15 @@ fn spline_alone_is_the_experiment() {
         assert!(text.contains(words), "{words}: {text}");
     }
     let page = workspace.read("page.html");
-    assert!(
-        page.matches("<svg").count() >= 3 && !page.contains("NaN") && page.trim_end().ends_with("</html>")
-    );
+    assert!(page.matches("data-figure=").count() == 3 && page.trim_end().ends_with("</html>"));
+    let figures = workspace.figures("page.html");
+    for (figure, path) in figures.iter().zip(paths) {
+        let jerks = ["X", "Y"].map(|axis| workspace::points(figure, 2, axis)).concat();
+        let most = jerks.iter().map(|(_, jerk)| jerk.abs()).fold(0.0, f64::max);
+        let by_tick = path["by_tick"].as_array().expect("a list");
+        let of_tick = by_tick.iter().find(|by_tick| by_tick["tick_s"] == found["tick_s"]).expect("the tick");
+        assert!((most / number(&of_tick["jerk_max_mm_s3"]) - 1.0).abs() < 1e-12, "{most} {of_tick}");
+    }
     let trace = workspace.read("axes.csv");
     let lines: Vec<&str> = trace.lines().collect();
     assert!(

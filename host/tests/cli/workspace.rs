@@ -1,9 +1,13 @@
 //! What the suites share: a folder with `motion` in it, and looks at its JSON.
 
 use std::fs;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD as BASE64;
+use flate2::read::ZlibDecoder;
 use serde_json::Value;
 
 /// A directory of a test's own, removed afterwards.
@@ -23,6 +27,16 @@ impl Workspace {
 
     pub(crate) fn read(&self, name: &str) -> String {
         fs::read_to_string(self.0.join(name)).expect("a file")
+    }
+
+    /// The figures of a page, as its script reads them.
+    pub(crate) fn figures(&self, page: &str) -> Vec<Value> {
+        let page = self.read(page);
+        let (_, rest) = page.split_once("id=\"figures\">").expect("figures");
+        let text = rest.split_once("</script>").expect("their end").0;
+        let mut json = Vec::new();
+        ZlibDecoder::new(&BASE64.decode(text).expect("base64")[..]).read_to_end(&mut json).expect("a stream");
+        serde_json::from_slice(&json).expect("a list of figures")
     }
 
     /// `motion` in this directory, to be started.
@@ -96,6 +110,24 @@ pub(crate) fn assert_has(value: &Value, expected: &[&str]) {
 
 pub(crate) fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
+}
+
+/// The points of a series of a figure: its `graph`, if it has some, and the name of the series.
+pub(crate) fn points(figure: &Value, graph: usize, name: &str) -> Vec<(f64, f64)> {
+    let of = if figure["graphs"].is_array() { &figure["graphs"][graph] } else { figure };
+    let series = of["series"].as_array().expect("series").iter().find(|series| series["name"] == name);
+    let points = series.unwrap_or_else(|| panic!("no {name} in {of}"))["points"].as_array().expect("points");
+    points.iter().map(|point| (number(&point[0]), number(&point[1]))).collect()
+}
+
+/// A series has these values, to what the text of a number tells.
+pub(crate) fn assert_points(found: &[(f64, f64)], expected: impl Iterator<Item = (f64, f64)>) {
+    let expected: Vec<(f64, f64)> = expected.collect();
+    assert_eq!(found.len(), expected.len());
+    let is_near = |a: f64, b: f64| (a - b).abs() <= 1e-12 * b.abs();
+    for (a, b) in found.iter().zip(&expected) {
+        assert!(is_near(a.0, b.0) && is_near(a.1, b.1), "{a:?} is drawn, {b:?} it is");
+    }
 }
 
 pub(crate) fn profile<'a>(from: &'a str, to: &'a str, more: &[&'a str]) -> Vec<&'a str> {

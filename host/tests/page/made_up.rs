@@ -78,7 +78,7 @@ fn trace() -> RunTrace {
 pub(crate) fn a_long_run_is_told_in_samples() {
     let workspace = Workspace::new("page-long");
     let mut page = Vec::new();
-    report::write_html(&trace(), None, &mut page).expect("memory");
+    report::write_html(&trace(), None, None, &mut page).expect("memory");
     assert!(page.len() < 3_000_000, "{} bytes", page.len());
     workspace.put("long.html", &String::from_utf8(page).expect("UTF-8"));
     let browser = Browser::open(&workspace.0.join("long.html"), [1400, 1000]);
@@ -133,7 +133,7 @@ pub(crate) fn pyramids_neither_lose_nor_invent_peaks() {
     let workspace = Workspace::new("page-pyramids");
     let mut page = Vec::new();
     let small = RunTrace { ticks: trace().ticks[..2000].to_vec(), ..trace() };
-    report::write_html(&small, None, &mut page).expect("memory");
+    report::write_html(&small, None, None, &mut page).expect("memory");
     workspace.put("small.html", &String::from_utf8(page).expect("UTF-8"));
     let browser = Browser::open(&workspace.0.join("small.html"), [1000, 800]);
     let mut random = motion_tests::random::Random::of_stream(25);
@@ -179,7 +179,7 @@ pub(crate) fn late_logs_with_gaps_and_rotary_axes_are_shown() {
     let of_log = |row: &TraceRow| (4_700..6_000).contains(&row.tick) && !(5_200..5_300).contains(&row.tick);
     log.ticks.retain(of_log);
     let mut page = Vec::new();
-    report::write_html(&log, None, &mut page).expect("memory");
+    report::write_html(&log, None, None, &mut page).expect("memory");
     workspace.put("log.html", &String::from_utf8(page).expect("UTF-8"));
     let browser = Browser::open(&workspace.0.join("log.html"), [1400, 1000]);
     assert_eq!(browser.number("motion.run.ticks"), 1_300.0);

@@ -4,6 +4,7 @@
 //! listed and ignored with the reason, but fails where `CI=true`. Work is counted, and no clock is read.
 
 mod browser;
+mod findings;
 mod made_up;
 mod playground;
 mod panel;
@@ -16,7 +17,7 @@ use std::process::ExitCode;
 
 use libtest_mimic::{Arguments, Failed, Trial};
 
-const TESTS: [(&str, fn()); 16] = [
+const TESTS: [(&str, fn()); 20] = [
     ("a_long_run_is_told_in_samples", made_up::a_long_run_is_told_in_samples),
     ("pyramids_neither_lose_nor_invent_peaks", made_up::pyramids_neither_lose_nor_invent_peaks),
     ("late_logs_with_gaps_and_rotary_axes_are_shown", made_up::late_logs_with_gaps_and_rotary_axes_are_shown),
@@ -30,6 +31,10 @@ const TESTS: [(&str, fn()); 16] = [
     ("two_runs_lie_beside_each_other", report::two_runs_lie_beside_each_other),
     ("faults_and_commands_are_marked", report::faults_and_commands_are_marked),
     ("a_phone_shows_all_of_it", report::a_phone_shows_all_of_it),
+    ("the_cursor_reads_what_was_measured", findings::the_cursor_reads_what_was_measured),
+    ("circles_are_looked_into", findings::circles_are_looked_into),
+    ("a_refusal_is_red", findings::a_refusal_is_red),
+    ("points_are_drawn_beside_their_spline", findings::points_are_drawn_beside_their_spline),
     ("a_program_is_driven_from_the_panel", panel::a_program_is_driven_from_the_panel),
     ("a_key_jogs_while_it_is_down", panel::a_key_jogs_while_it_is_down),
     ("tabs_share_a_machine_and_come_back_to_it", panel::tabs_share_a_machine_and_come_back_to_it),

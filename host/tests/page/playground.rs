@@ -66,6 +66,15 @@ impl Playground {
         self.browser.wait_for(&format!("return playground.shown > {shown} ? true : null"));
     }
 
+    /// The kinds of the figures that are drawn.
+    fn drawn(&self) -> Vec<String> {
+        let kinds = self.browser.run(
+            "return playground.figures.map((of) => (of.graphs ? 'stack' : of.curves ? 'polar' : 'plane'))",
+        );
+        let kinds = kinds.as_array().expect("a list").iter();
+        kinds.map(|kind| kind.as_str().expect("text").to_owned()).collect()
+    }
+
     /// A figure of the page, by its name.
     fn figure(&self, name: &str) -> f64 {
         let of = format!("[...document.querySelectorAll('dt')].find((e) => e.textContent === '{name}')");
@@ -400,6 +409,7 @@ pub(crate) fn drives_are_measured() {
     for (row, key) in keys.into_iter().enumerate() {
         told.assert_at([0, row, 1], &step[key]);
     }
+    assert_eq!(page.drawn(), ["stack", "stack"]);
     let told = Told::of(&page, "harmonic", 0);
     let harmonic = machine(&["harmonic"]);
     for row in 0..10 {
@@ -410,7 +420,12 @@ pub(crate) fn drives_are_measured() {
             told.assert_at([0, row, column], &point[key]);
         }
     }
+    assert_eq!(page.drawn(), ["stack"]);
+    let swing = page.browser.number("playground.figures[0].graphs[0].curves[0].y[3]");
+    let ratio = number(&harmonic["axes"][0]["points"][3]["swing_ratio"]);
+    assert!((swing - 20.0 * ratio.log10()).abs() < 1e-9, "{swing} {ratio}");
     let told = Told::of(&page, "circle", 0);
+    assert_eq!(page.drawn(), ["stack", "polar", "stack", "polar", "stack"]);
     let circles = machine(&["circle", "--from", "4", "--to", "4", "--feedforward", "v,va,as-is"]);
     for table in 0..3 {
         let circle = &circles["feedforward"][table]["circles"][0];
@@ -452,6 +467,8 @@ pub(crate) fn axes_are_tuned() {
     }
     let circles = tuned["verification"]["circles"].as_array().expect("a list");
     assert_eq!(circles.len(), 12);
+    assert_eq!(page.drawn().iter().filter(|kind| *kind == "polar").count(), 12);
+    assert_eq!(page.drawn().len(), 2 * 3 + 2 * 12);
     for (index, circle) in circles.iter().enumerate() {
         let (table, row) = (3 + index / 6, index % 6);
         told.assert_at([table, row, 1], &circle["feed_mm_min"]);

@@ -108,7 +108,7 @@ pub fn run(arguments: &BodeArguments, out: &mut dyn Write) -> Result<Outcome, Cl
         )
         .map_err(CliError::Output)?;
     }
-    arguments.common.write_report(report, out, |file| report::drive::write_bode(&machine, &bode, file))?;
+    arguments.common.write_report(report, out, || Ok(report::drive::bode_findings(&machine, &bode)))?;
     Ok(Outcome::Done)
 }
 

@@ -18,7 +18,7 @@ use crate::drive::circle::{CircleFigures, Sweep, sweep};
 use crate::drive::circle_motion::Circle;
 use crate::drive::reference;
 use crate::machine::AxisSettings;
-use crate::report;
+use crate::report::drive::{Around, CircleSweep, circle_findings};
 
 const HELP: &str = "\
 Read from encoder positions over the last second at constant feed: the contour error is the actual minus the
@@ -146,11 +146,17 @@ pub fn run(arguments: &CircleArguments, out: &mut dyn Write) -> Result<Outcome, 
         for &frequency_hz in &arguments.show {
             let circle = Circle::new(frequency_hz, feed_mm_s);
             for sweep in &sweeps {
-                shown.push((sweep.name, circle, circle.record(&sweep.machine)?));
+                shown.push(Around::of(sweep.name, &circle, &circle.record(&sweep.machine)?)?);
             }
         }
-        arguments.common.write_report(report, out, |file| {
-            report::drive::write_circle(&machine, &sweeps, arguments.limit_um, &shown, &comparisons, file)
+        arguments.common.write_report(report, out, || {
+            let limits_hz: Vec<Option<f64>> = sweeps.iter().map(|sweep| sweep.limit_hz).collect();
+            let sweeps: Vec<CircleSweep<'_>> = sweeps
+                .iter()
+                .map(|sweep| CircleSweep { name: sweep.name, circles: &sweep.circles })
+                .collect();
+            let limits = (&limits_hz[..], arguments.limit_um);
+            Ok(circle_findings(&machine, &sweeps, limits, &shown, &comparisons))
         })?;
     }
     Ok(outcome(&comparisons))

@@ -157,9 +157,10 @@ pub fn run(arguments: &CompareArguments, out: &mut dyn Write) -> Result<Outcome,
         for choice in [Choice::PeerFitted, Choice::VajFitted] {
             outputs.push((choice, regulators.output(choice, &circle, last_um, OUTPUT_SPAN_S)?));
         }
-        arguments.common.write_report(report, out, |file| {
+        arguments.common.write_report(report, out, || {
             let resolutions_um = [first_um, last_um];
-            report::drive::write_compare(&machine, (&motions, &rows), &sweeps, &outputs, resolutions_um, file)
+            let rows = (&motions[..], &rows[..]);
+            Ok(report::drive::compare_findings(&machine, rows, &sweeps, &outputs, resolutions_um))
         })?;
     }
     Ok(Outcome::Done)

@@ -163,8 +163,8 @@ pub fn run(arguments: &HarmonicArguments, out: &mut dyn Write) -> Result<Outcome
             waves.push((circle, circle.record(&ran)?));
         }
         let words = if arguments.closed_loop { "" } else { &explanation };
-        arguments.common.write_report(report, out, |file| {
-            report::drive::write_harmonic(&machine, &found, &waves, words, &comparisons, file)
+        arguments.common.write_report(report, out, || {
+            report::drive::harmonic_findings(&machine, &found, &waves, words, &comparisons)
         })?;
     }
     Ok(outcome(&comparisons))

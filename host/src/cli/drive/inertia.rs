@@ -108,7 +108,7 @@ pub fn run(arguments: &InertiaArguments, out: &mut dyn Write) -> Result<Outcome,
     }
     arguments
         .common
-        .write_report(report, out, |file| report::drive::write_inertia(&machine, &circle, &found, file))?;
+        .write_report(report, out, || report::drive::inertia_findings(&machine, &circle, &found))?;
     Ok(Outcome::Done)
 }
 

@@ -31,11 +31,12 @@ use super::error::{CliError, Outcome};
 use super::input;
 use super::outputs::{self, Written};
 use super::table::{self, Align};
-use crate::drive::Terms;
 use crate::drive::experiment::fastest_mm_s;
 use crate::drive::reference::Comparison;
+use crate::drive::{DriveError, Terms};
 use crate::files::{Files, OutputFile};
 use crate::machine::Machine;
+use crate::report::Findings;
 
 /// More frequencies than this mean a mistyped step.
 const FREQUENCIES_MAX: f64 = 1000.0;
@@ -128,10 +129,14 @@ impl Common {
         &self,
         report: Option<OutputFile>,
         out: &mut dyn Write,
-        write: impl FnOnce(&mut OutputFile) -> io::Result<()>,
+        findings: impl FnOnce() -> Result<Findings, DriveError>,
     ) -> Result<(), CliError> {
+        if report.is_none() {
+            return Ok(());
+        }
+        let findings = findings()?;
         let mut written = Written::default();
-        written.write("report", report, write);
+        written.write("report", report, |file| findings.write(file));
         if written.place_of("report").is_some() && !self.json {
             writeln!(out).map_err(CliError::Output)?;
             written.say(out)?;

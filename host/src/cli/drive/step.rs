@@ -91,8 +91,8 @@ pub fn run(arguments: &StepArguments, out: &mut dyn Write) -> Result<Outcome, Cl
             .and_then(|()| write_comparisons(&comparisons, out))
             .map_err(CliError::Output)?;
     }
-    arguments.common.write_report(report, out, |file| {
-        report::drive::write_step(&machine, &step, &response, &figures, &comparisons, file)
+    arguments.common.write_report(report, out, || {
+        Ok(report::drive::step_findings(&machine, &step, &response, &figures, &comparisons))
     })?;
     Ok(outcome(&comparisons))
 }

@@ -4,6 +4,7 @@
 use std::fs;
 use std::io::{self, Write};
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -17,15 +18,17 @@ use crate::cli::table::{self, Align};
 use crate::cli::write_json;
 use crate::drive::circle_motion::Circle;
 use crate::drive::identification::identify_axes;
-use crate::drive::learning::{LearningOptions, Learnt, Model, Reason, learn};
+use crate::drive::learning::{LearningOptions, Learnt, Model, Reason, RepeatFigures, Robustness, learn};
 use crate::drive::recorded::Scales;
 use crate::drive::reference::CIRCLE_FEED_MM_S;
 use crate::drive::verification::{bears_mm_s2, planes};
 use crate::files::Files;
 use crate::identify::{Estimate, Identification};
 use crate::machine::{AxisEdit, AxisSettings, Machine, REFERENCE_TOML, edited};
+use crate::report::drive::{LearntRow, TunedAxis, Tuning, tune_findings};
+use crate::report::{Findings, Verdict};
 use crate::simulate::StretchCorrection;
-use crate::tuning::{self, AxisTuning, TuningError, propose};
+use crate::tuning::{self, AxisTuning, propose};
 
 const HELP: &str = "\
 All axes are simulated: those of the machine file, with its [axis.drive]. No axis of a real machine is moved. With --from
@@ -52,6 +55,10 @@ if the machine file was written; else why not, also where nothing could be tuned
 
 Circles stay within what the outputs reach and the current limit that was found bears: a circle that is driven slower
 than the others, or not at all, is in not_driven.
+
+--report: parameters with intervals and what is not determined, gains and feedforward with reasons, margins, Bode plots of
+model and measurement, circles before and after. It is written where tuning fails, too, with the reason in red; where an
+argument or a file is refused, it is not.
 
 --learn-output: CSV with time_s from the stretch's first tick on, and a column of mm/s for each axis, added to
 feedforward and linear between rows; CorrectedIntake::correct hands it to the kernel. It has no rows if no correction was
@@ -96,7 +103,8 @@ pub struct TuneArguments {
     /// Machine file (`motion machine` prints one); without it, the reference machine.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
-    /// Write a self-contained HTML page with the circles before and after; an existing file is replaced.
+    /// Write a self-contained HTML page with what was found, gains, margins, Bode plots and circles before
+    /// and after, also where tuning fails; an existing file is replaced.
     #[arg(long, value_name = "FILE.html")]
     report: Option<PathBuf>,
     /// Print JSON; every key carries its unit.
@@ -157,47 +165,46 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
         let found = format!("--from with {} axes", axes.len());
         return Err(CliError::Arguments { found, expected: "--axis with the one axis that was recorded" });
     }
-    let tunings = match tunings(&machine, &axes, arguments) {
-        Ok(tunings) => tunings,
-        Err(error) => {
-            if arguments.json {
-                let (axes, verification, learning, output) = ([], None, None, None);
-                let reason = error.to_string();
-                write_json(&RefusalJson { axes, verification, learning, output, reason }, out)?;
-            }
-            return Err(error);
-        }
+    let mut work = Work::default();
+    let failure = match work.tune(&machine, &source, &axes, arguments, learning.as_ref()) {
+        // Files of a refused input stay as they were.
+        Err(refusal) if refusal.exit_code() == ExitCode::from(2) => return Err(refusal),
+        done => done.err(),
     };
-    // Verify exactly what the file will say.
-    let edits: Vec<AxisEdit> = tunings.iter().map(Tuned::edit).collect();
-    let text = edited(&source.name, &source.text, &edits)?;
-    let tuned = Machine::from_toml(&source.name, &text)?;
-    // A recorded axis is no simulated one: what is verified is the model that was found.
-    let (before, after) = match arguments.from {
-        Some(_) => (as_found(&machine, &tunings), as_found(&tuned, &tunings)),
-        None => (machine.clone(), tuned.clone()),
-    };
-    let bears: Vec<Option<f64>> = tunings.iter().map(|tuned| bears_mm_s2(&tuned.found)).collect();
-    let verification = Verification::new(&before, &after, &axes, &bears)?;
-    let worse = verification.reason();
-    let is_better = worse.is_none();
-    let learnt = learning.map(|lesson| lesson.learn(&tuned, &tunings)).transpose()?;
+    let refused = failure.as_ref().map(ToString::to_string);
+    let worse = work.verification.as_ref().and_then(Verification::reason);
+    let reason = refused.or(worse);
     let mut written = Written::default();
-    written.write("machine file", output.filter(|_| is_better), |file| file.write_all(text.as_bytes()));
-    if let Some(learnt) = &learnt {
-        written.write("correction", learn_output, |file| write_correction(&tuned, learnt, file));
+    let is_better = reason.is_none();
+    written.write("machine file", output.filter(|_| is_better), |file| file.write_all(work.text.as_bytes()));
+    if let (Some(learnt), None) = (&work.learnt, &failure) {
+        written.write("correction", learn_output, |file| write_correction(&machine, learnt, file));
     }
-    written.write("report", report, |file| verification.write_report(&tuned, file));
-    if arguments.json {
-        let output = written.place_of("machine file").map(str::to_owned);
-        let reason = worse.or_else(|| output.is_none().then(|| "--output was not given".to_owned()));
-        write_json(&json(&machine, &tunings, &verification, learnt.as_ref(), (output, reason)), out)?;
-    } else {
-        write_words(&machine, &tunings, &verification, out).map_err(CliError::Output)?;
-        if let Some(learnt) = &learnt {
-            write_learnt(&tuned, learnt, arguments.learn_hz, out).map_err(CliError::Output)?;
+    let place = written.place_of("machine file").map(str::to_owned);
+    let ending =
+        Ending { is_refused: failure.is_some(), reason, was_asked: arguments.output.is_some(), place };
+    written.write("report", report, |file| work.findings(&machine, &ending, arguments.learn_hz).write(file));
+    if let Some(failure) = failure {
+        if arguments.json {
+            let (axes, verification, learning, output) = ([], None, None, None);
+            let reason = failure.to_string();
+            write_json(&RefusalJson { axes, verification, learning, output, reason }, out)?;
+        } else {
+            written.say(out)?;
         }
-        let end = match (&arguments.output, worse) {
+        return CliError::all([written.outcome(Outcome::Failed), Err(failure)]);
+    }
+    let Some(verification) = &work.verification else { return written.outcome(Outcome::Failed) };
+    if arguments.json {
+        let Ending { reason, place, .. } = ending;
+        let reason = reason.or_else(|| place.is_none().then(|| "--output was not given".to_owned()));
+        write_json(&json(&machine, &work.tunings, verification, work.learnt.as_ref(), (place, reason)), out)?;
+    } else {
+        write_words(&machine, &work.tunings, verification, out).map_err(CliError::Output)?;
+        if let Some(learnt) = &work.learnt {
+            write_learnt(&machine, learnt, arguments.learn_hz, out).map_err(CliError::Output)?;
+        }
+        let end = match (&arguments.output, ending.reason) {
             (_, Some(worse)) => Some(format!("  no machine file is written: {worse}")),
             (None, None) => Some("  no machine file is written; --output FILE writes it".to_owned()),
             (Some(_), None) => None,
@@ -206,6 +213,113 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
         written.say(out)?;
     }
     written.outcome(if is_better { Outcome::Done } else { Outcome::Failed })
+}
+
+/// How tuning ended.
+struct Ending {
+    /// Nothing could be tuned.
+    is_refused: bool,
+    /// Why the machine is not better.
+    reason: Option<String>,
+    /// Whether a machine file was to be written, and where it was.
+    was_asked: bool,
+    place: Option<String>,
+}
+
+impl Ending {
+    /// The sentence that says so: its beginning, and the rest.
+    fn words(&self) -> (Verdict, &'static str, String) {
+        let no_worse = "no circle is worse than before.";
+        match (&self.reason, &self.place) {
+            (Some(reason), _) if self.is_refused => (Verdict::Failed, "Not tuned:", reason.clone()),
+            (Some(reason), _) => {
+                (Verdict::Failed, "Not better:", format!("{reason}. No machine file is written."))
+            }
+            (None, Some(place)) => {
+                (Verdict::Done, "Tuned:", format!("{no_worse} The machine file is written to {place}."))
+            }
+            (None, None) if self.was_asked => {
+                (Verdict::Failed, "Not written:", format!("{no_worse} The machine file can’t be written."))
+            }
+            (None, None) => {
+                let words = format!("{no_worse} No machine file is written; --output FILE writes it.");
+                (Verdict::Unfinished, "Tuned, not written:", words)
+            }
+        }
+    }
+}
+
+/// How far tuning has come.
+#[derive(Default)]
+struct Work {
+    /// The axes that were identified.
+    found: Vec<(usize, Identification)>,
+    /// Those of them for which there is a proposal.
+    tunings: Vec<Tuned>,
+    /// The machine file with the new figures.
+    text: String,
+    verification: Option<Verification>,
+    learnt: Option<Learnt>,
+}
+
+impl Work {
+    /// Identifies, proposes, verifies and learns.
+    fn tune(
+        &mut self,
+        machine: &Machine,
+        source: &Source,
+        axes: &[usize],
+        arguments: &TuneArguments,
+        learning: Option<&Lesson>,
+    ) -> Result<(), CliError> {
+        let found = identified(machine, axes, arguments)?;
+        self.found = axes.iter().copied().zip(found).collect();
+        let method = arguments.method.into();
+        for (axis, found) in &self.found {
+            let tuning = propose(&machine.axes[*axis], found, method, machine.tick_s)?;
+            self.tunings.push(Tuned { axis: *axis, found: found.clone(), tuning });
+        }
+        // Verify exactly what the file will say.
+        let edits: Vec<AxisEdit> = self.tunings.iter().map(Tuned::edit).collect();
+        self.text = edited(&source.name, &source.text, &edits)?;
+        let tuned = Machine::from_toml(&source.name, &self.text)?;
+        // A recorded axis is no simulated one: what is verified is the model that was found.
+        let (before, after) = match arguments.from {
+            Some(_) => (as_found(machine, &self.tunings), as_found(&tuned, &self.tunings)),
+            None => (machine.clone(), tuned.clone()),
+        };
+        let bears: Vec<Option<f64>> = self.found.iter().map(|(_, found)| bears_mm_s2(found)).collect();
+        self.verification = Some(Verification::new(&before, &after, axes, &bears));
+        self.learnt = learning.map(|lesson| lesson.learn(&tuned, &self.tunings)).transpose()?;
+        Ok(())
+    }
+
+    /// What a page shows of it.
+    fn findings(&self, machine: &Machine, ending: &Ending, learn_hz: f64) -> Findings {
+        let (verdict, bold, rest) = ending.words();
+        let (circles, not_driven, shown) =
+            self.verification.as_ref().map_or_else(Default::default, Verification::shown);
+        let axes = self.found.iter().map(|(axis, found)| {
+            let tuned = self.tunings.iter().find(|tuned| tuned.axis == *axis);
+            TunedAxis { axis: *axis, found, tuning: tuned.map(|tuned| &tuned.tuning) }
+        });
+        let learnt = self.learnt.as_ref().map(|learnt| {
+            let row = |figures: &RepeatFigures| LearntRow {
+                contour_um: figures.contour_um,
+                rms_um: figures.rms_um,
+            };
+            let mut words = vec![format!(
+                "A circle at {learn_hz} Hz: repeat {} is the best; ended: {}.",
+                learnt.best_repeat,
+                ended(&learnt.stopped)
+            )];
+            words.extend(robustness_in_words(machine, learnt));
+            (learnt.repeats.iter().map(row).collect(), words)
+        });
+        let words = [bold, &rest];
+        let axes = axes.collect();
+        tune_findings(machine, &Tuning { verdict, words, axes, circles, not_driven, shown, learnt })
+    }
 }
 
 /// `machine` with the drives that were found.
@@ -217,21 +331,19 @@ fn as_found(machine: &Machine, tunings: &[Tuned]) -> Machine {
     machine
 }
 
-/// Identifies the axes and proposes their settings.
-fn tunings(machine: &Machine, axes: &[usize], arguments: &TuneArguments) -> Result<Vec<Tuned>, CliError> {
-    let method = arguments.method.into();
-    let found = match (&arguments.from, axes) {
+/// The axes as they were recorded, or as they are simulated.
+fn identified(
+    machine: &Machine,
+    axes: &[usize],
+    arguments: &TuneArguments,
+) -> Result<Vec<Identification>, CliError> {
+    match (&arguments.from, axes) {
         (Some(path), &[axis]) => {
             let &AxisSettings { mm_s_at_10_v, mm_per_count, .. } = &machine.axes[axis];
-            vec![from_recording(machine, axis, path, Scales { mm_s_at_10_v, mm_per_count })?]
+            Ok(vec![from_recording(machine, axis, path, Scales { mm_s_at_10_v, mm_per_count })?])
         }
-        _ => identify_axes(machine, axes)?,
-    };
-    let tuned = axes.iter().zip(found).map(|(&axis, found)| {
-        let tuning = propose(&machine.axes[axis], &found, method, machine.tick_s)?;
-        Ok(Tuned { axis, found, tuning })
-    });
-    Ok(tuned.collect::<Result<_, TuningError>>()?)
+        _ => Ok(identify_axes(machine, axes)?),
+    }
 }
 
 /// The text of the machine file, or that of the reference machine.
@@ -366,17 +478,23 @@ fn write_learnt(
         })
         .collect();
     table::write(&columns, &rows, out)?;
-    for (axis, robustness) in machine.axes.iter().zip(&learnt.robustness) {
-        if let Some(robustness) = robustness {
-            writeln!(
-                out,
-                "  {}: filter of {:.0} Hz; a repeat leaves at most {:.2} of an error (at {:.0} Hz), with Kv, Ti, current \
-                 lag, dead time and the bed's frequency up to a fifth off",
-                axis.name, robustness.filter.corner_hz, robustness.contraction, robustness.at_hz
-            )?;
-        }
+    for words in robustness_in_words(machine, learnt) {
+        writeln!(out, "  {words}")?;
     }
     writeln!(out, "  repeat {} is the best; ended: {}\n", learnt.best_repeat, ended(&learnt.stopped))
+}
+
+/// How safe each axis' law is.
+fn robustness_in_words(machine: &Machine, learnt: &Learnt) -> Vec<String> {
+    let of = |(axis, robustness): (&AxisSettings, &Option<Robustness>)| {
+        let robustness = robustness.as_ref()?;
+        Some(format!(
+            "{}: filter of {:.0} Hz; a repeat leaves at most {:.2} of an error (at {:.0} Hz), with Kv, Ti, current \
+             lag, dead time and the bed's frequency up to a fifth off",
+            axis.name, robustness.filter.corner_hz, robustness.contraction, robustness.at_hz
+        ))
+    };
+    machine.axes.iter().zip(&learnt.robustness).filter_map(of).collect()
 }
 
 fn ended(reason: &Reason) -> String {

@@ -7,25 +7,21 @@ use std::io::{self, Write};
 
 use serde::Serialize;
 
-use super::super::error::CliError;
 use super::super::progress::Progress;
 use super::super::table::{self, Align};
 use crate::drive::DriveError;
-use crate::drive::circle::{CircleFigures, Sweep, figures};
+use crate::drive::circle::{CircleFigures, figures};
 use crate::drive::reference::CIRCLE_FEED_MM_S;
 use crate::drive::verification::{VERIFIED_HZ, Verdict, circle, planes};
-use crate::gcode::Plane;
 use crate::machine::Machine;
-use crate::report::{self, drive::Shown};
+use crate::report::drive::{self as drawn, Around};
 
-/// Frequencies whose circles the report draws \[Hz\].
-const SHOWN_HZ: [f64; 2] = [4.0, 13.0];
-/// The contour error that S4 asks for \[µm\].
-const LIMIT_UM: f64 = 20.0;
 /// Circles before and after.
 pub(super) struct Verification {
+    /// The machine after tuning.
+    machine: Machine,
     planes: Vec<Verified>,
-    shown: Vec<Shown>,
+    shown: Vec<Around>,
     not_driven: Vec<NotDriven>,
 }
 
@@ -43,45 +39,38 @@ pub(super) struct NotDriven {
 
 /// The circles of one plane.
 struct Verified {
+    axes: [usize; 2],
     /// Which of the plane's axes were tuned.
     is_tuned: [bool; 2],
-    before: Sweep,
-    after: Sweep,
+    before: Vec<CircleFigures>,
+    after: Vec<CircleFigures>,
 }
 
 impl Verified {
     fn pairs(&self) -> impl Iterator<Item = (&CircleFigures, &CircleFigures)> {
-        self.before.circles.iter().zip(&self.after.circles)
+        self.before.iter().zip(&self.after)
     }
 
-    fn verdict(&self) -> Verdict<'_> {
-        Verdict { machine: &self.after.machine, is_tuned: self.is_tuned }
+    fn verdict<'a>(&self, machine: &'a Machine) -> Verdict<'a> {
+        Verdict { machine, is_tuned: self.is_tuned }
     }
 }
 
 impl Verification {
     /// Drives the circles on the machine `before` and `after` tuning the axes `tuned`, within the accelerations
     /// that they bear \[mm/s²\], as far as that was found.
-    ///
-    /// # Errors
-    /// A circle is out of an experiment's ranges.
     pub(super) fn new(
         before: &Machine,
         after: &Machine,
         tuned: &[usize],
         bears_mm_s2: &[Option<f64>],
-    ) -> Result<Self, CliError> {
+    ) -> Self {
         let planes = planes(tuned);
         let mut progress = Progress::new((planes.len() * VERIFIED_HZ.len()) as u64);
         let mut shown = Vec::new();
         let mut not_driven = Vec::new();
         let mut verified = Vec::with_capacity(planes.len());
         for plane in planes {
-            let [was, is] = match plane {
-                Plane::Xy => ["before, XY", "after, XY"],
-                Plane::Zx => ["before, ZX", "after, ZX"],
-                Plane::Yz => ["before, YZ", "after, YZ"],
-            };
             let [first, second, _] = plane.axes();
             let axes = [first, second];
             let names = axes.map(|axis| after.axes[axis].name.clone());
@@ -102,40 +91,29 @@ impl Verification {
                     let slower = format!("{reason}: driven at {:.0} mm/min instead", feed_mm_s * 60.0);
                     not_driven.push(not(CIRCLE_FEED_MM_S, slower, false));
                 }
-                let drive = |machine: &Machine| {
+                let drive = |name: &str, machine: &Machine| {
                     let recording = circle.record(machine)?;
-                    Ok((figures(&recording, &circle)?, recording))
+                    Ok((figures(&recording, &circle)?, Around::of(name, &circle, &recording)?))
                 };
-                let both: [Result<_, DriveError>; 2] = [drive(before), drive(after)];
+                let both: [Result<_, DriveError>; 2] = [drive("before", before), drive("after", after)];
                 progress.step();
                 match both {
                     [Ok(before), Ok(after)] => {
-                        for ((figures, recording), (name, circles)) in
-                            [before, after].into_iter().zip([was, is].into_iter().zip(&mut circles))
-                        {
+                        for ((figures, around), circles) in [before, after].into_iter().zip(&mut circles) {
                             circles.push(figures);
-                            if SHOWN_HZ.contains(&frequency_hz) {
-                                shown.push((name, circle, recording));
-                            }
+                            shown.push(around);
                         }
                     }
                     [Err(error), _] => not_driven.push(not(feed_mm_s, format!("before: {error}"), false)),
                     [Ok(_), Err(error)] => not_driven.push(not(feed_mm_s, format!("after: {error}"), true)),
                 }
             }
-            let [before, after] = [(was, before), (is, after)].map(|(name, machine)| (name, machine.clone()));
-            let sweep = |(name, machine), circles: Vec<CircleFigures>| {
-                let within = |figures: &&CircleFigures| figures.contour_um() <= LIMIT_UM;
-                let limit_hz = circles.iter().take_while(within).last().map(|figures| figures.frequency_hz);
-                Sweep { name, machine, circles, limit_hz }
-            };
             let [of_before, of_after] = circles;
             let is_tuned = axes.map(|axis| tuned.contains(&axis));
-            let (before, after) = (sweep(before, of_before), sweep(after, of_after));
-            verified.push(Verified { is_tuned, before, after });
+            verified.push(Verified { axes, is_tuned, before: of_before, after: of_after });
         }
         progress.finish();
-        Ok(Self { planes: verified, shown, not_driven })
+        Self { machine: after.clone(), planes: verified, shown, not_driven }
     }
 
     /// Why the machine is not better, if it is not.
@@ -146,11 +124,11 @@ impl Verification {
                 lost.frequency_hz, lost.reason
             ));
         }
-        if self.planes.iter().all(|plane| plane.before.circles.is_empty()) {
+        if self.planes.iter().all(|plane| plane.before.is_empty()) {
             return Some("no circle could be driven, so nothing was verified".to_owned());
         }
         self.planes.iter().find_map(|plane| {
-            let verdict = plane.verdict();
+            let verdict = plane.verdict(&self.machine);
             let (before, after) =
                 plane.pairs().find(|(before, after)| !verdict.is_no_worse(before, after))?;
             Some(format!(
@@ -162,18 +140,27 @@ impl Verification {
         })
     }
 
-    /// The page of the circles.
-    pub(super) fn write_report(&self, machine: &Machine, out: &mut impl Write) -> io::Result<()> {
-        let sweeps: Vec<Sweep> =
-            self.planes.iter().flat_map(|plane| [plane.before.clone(), plane.after.clone()]).collect();
-        report::drive::write_circle(machine, &sweeps, LIMIT_UM, &self.shown, &[], out)
+    /// What a page shows of it: the circles by plane, those that were not driven, and those that are drawn.
+    pub(super) fn shown(&self) -> (Vec<drawn::Circles<'_>>, Vec<drawn::NotDriven<'_>>, &[Around]) {
+        let circles = self.planes.iter().map(|plane| {
+            let verdict = plane.verdict(&self.machine);
+            let pairs =
+                plane.pairs().map(|(before, after)| (before, after, !verdict.is_no_worse(before, after)));
+            drawn::Circles { axes: plane.axes, pairs: pairs.collect() }
+        });
+        let not_driven = self.not_driven.iter().map(|circle| drawn::NotDriven {
+            axes: &circle.axes,
+            frequency_hz: circle.frequency_hz,
+            feed_mm_min: circle.feed_mm_min,
+            reason: &circle.reason,
+        });
+        (circles.collect(), not_driven.collect(), &self.shown)
     }
 
     /// A table of each plane.
     pub(super) fn write_words(&self, out: &mut dyn Write) -> io::Result<()> {
         for plane in &self.planes {
-            let axes = plane.after.circles.first().map_or([0, 1], |circle| circle.axes);
-            let [first, second] = axes.map(|axis| plane.after.machine.axes[axis].name.as_str());
+            let [first, second] = plane.axes.map(|axis| self.machine.axes[axis].name.as_str());
             writeln!(out, "Circles of {first} and {second}, before and after\n")?;
             let columns = [
                 ("frequency", "Hz", Align::Right),
@@ -233,7 +220,7 @@ impl Verification {
             after: circle(after),
         };
         let pairs = |plane: &Verified| -> Vec<PairJson> {
-            plane.pairs().map(|both| pair(both, &plane.after.machine)).collect()
+            plane.pairs().map(|both| pair(both, &self.machine)).collect()
         };
         VerificationJson {
             feed_mm_min: CIRCLE_FEED_MM_S * 60.0,

@@ -29,7 +29,9 @@ pub(super) fn run(arguments: &SplineArguments, out: &mut dyn Write) -> Result<Ou
         .map(|course| smoothness::evaluators(&course, FEED_MM_S, TICK_S));
     let mut written = Written::default();
     written.write("trace", trace, |file| write_trace(&paths, file));
-    written.write("report", report, |file| report::smoothness::write_smoothness(&paths, &evaluated, file));
+    written.write("report", report, |file| {
+        report::smoothness::smoothness_findings(&paths, &evaluated).write(file)
+    });
     if arguments.json {
         write_json(&json(&paths, &evaluated), out)?;
     } else {

@@ -19,6 +19,7 @@ use crate::files::Files;
 use crate::planning::plan_spline;
 use crate::planning::spline::Pieces;
 use crate::points::{self, Points};
+use crate::report::spline::spline_findings;
 use crate::simulate::RunOptions;
 use crate::toolpath::spline::{self, Degree, Spline, SplineError};
 
@@ -31,7 +32,7 @@ one steps in jerk at its knots. The machine moves from the origin to the first p
 Examples:
   motion spline points.csv --feed 3000               through all points, on the reference machine
   motion spline points.csv --tolerance 0.01 --report points.html
-                                                     within 10 µm of each, and the pictures of the run
+                                                     within 10 µm of each; the run, points, deviation
   motion spline --report smoothness.html             published arcs, cubic and quintic side by side
 
 JSON of a run: that of `motion run`, and spline: degree, points, spans, length_mm, deviation_mm (greatest, of a point),
@@ -124,13 +125,13 @@ fn run_points(path: &Path, arguments: &SplineArguments, out: &mut dyn Write) -> 
         });
     }
     let mut files = Files::reading([("POINTS.csv", Some(path)), ("--machine", arguments.machine.as_deref())]);
-    let outputs = Outputs::open(&mut files, &arguments.trace, arguments.report.as_ref(), arguments.json)?;
+    let mut outputs = Outputs::open(&mut files, &arguments.trace, arguments.report.as_ref(), arguments.json)?;
     let mut printed = outputs.printed(out);
     let out = &mut *printed;
     let machine = input::xyz_machine(arguments.machine.as_ref())?;
     let source = input::read(path)?;
     let points = points::read(&source.name, &source.text)?;
-    let spline = fit(&points, arguments).map_err(|error| {
+    let (spline, parameters) = fit(&points, arguments).map_err(|error| {
         let line = error.point().and_then(|point| points.lines.get(point));
         let place = line.map_or_else(|| source.name.clone(), |line| format!("{}:{line}", source.name));
         match error {
@@ -145,6 +146,9 @@ fn run_points(path: &Path, arguments: &SplineArguments, out: &mut dyn Write) -> 
     let (mut plan, pieces) = plan_spline(&source.name, &spline, &points.lines, feed_mm_s, &machine)?;
     let figures = SplineFigures::of(&spline, points.points.len(), &pieces, feed_mm_s);
     plan.notices.extend(figures.words());
+    if outputs.has_report() {
+        outputs = outputs.below(spline_findings(&points, &parameters, &spline, arguments.tolerance));
+    }
     let (summary, written) = run::execute(&RunOptions::default(), &plan, &machine, outputs, None)?;
     if arguments.json {
         write_json(&SplineJson { run: run::json(&summary), spline: figures }, out)?;
@@ -155,12 +159,14 @@ fn run_points(path: &Path, arguments: &SplineArguments, out: &mut dyn Write) -> 
     written.outcome(Outcome::of(&summary))
 }
 
-fn fit(points: &Points, arguments: &SplineArguments) -> Result<Spline, SplineError> {
+/// The spline, and the points' parameters.
+fn fit(points: &Points, arguments: &SplineArguments) -> Result<(Spline, Vec<f64>), SplineError> {
     let parameters = match &points.parameters {
         Some(parameters) => parameters.clone(),
         None => spline::chord_lengths(&points.points)?,
     };
-    spline::fit(&points.points, &parameters, arguments.degree.degree(), arguments.tolerance)
+    let spline = spline::fit(&points.points, &parameters, arguments.degree.degree(), arguments.tolerance)?;
+    Ok((spline, parameters))
 }
 
 #[derive(Serialize)]

@@ -1,82 +1,207 @@
 //! The page of the circle test: errors over frequency, around the circle, and over a revolution.
 
-use std::io::{self, Write};
-
-use super::super::figure_html;
-use super::super::format::{escape, figure, fixed};
+use super::super::figure::{Axis, Figure, Graph, Polar, Series, Stack, ends_of};
+use super::super::findings::Findings;
+use super::super::format::{figure, fixed};
 use super::super::palette;
-use super::super::plots::graph::{Graph, Series, Stack};
-use super::super::plots::{Caption, polar};
-use super::{legend, table};
+use super::open;
 use crate::drive::Recording;
-use crate::drive::circle::{CircleFigures, Sweep, deviations};
+use crate::drive::circle::{CircleFigures, deviations};
 use crate::drive::circle_motion::Circle;
+use crate::drive::experiment::DriveError;
 use crate::drive::reference::Comparison;
 use crate::machine::Machine;
 
-/// A circle to be shown: what acted, the motion, its recording.
-pub type Shown = (&'static str, Circle, Recording);
+/// The contour error that S4 asks for \[µm\].
+pub const CIRCLE_LIMIT_UM: f64 = 20.0;
+/// Time of a motion that is shown at most \[s\].
+const SHOWN_S: f64 = 1.0;
 
-/// Writes the page.
-///
-/// # Errors
-/// Whatever `out` reports; a recording without its steady part.
-pub fn write_circle(
-    machine: &Machine,
-    sweeps: &[Sweep],
-    limit_um: f64,
-    shown: &[Shown],
-    comparisons: &[Comparison],
-    out: &mut impl Write,
-) -> io::Result<()> {
-    let feed_m_min =
-        sweeps.iter().flat_map(|sweep| &sweep.circles).next().map_or(0.0, |figures| figures.feed_mm_s * 0.06);
-    let title = format!("Circle test at {} m/min", figure(feed_m_min, 4));
-    let passed: Vec<String> = sweeps
-        .iter()
-        .map(|sweep| {
-            let hz = sweep.limit_hz.map_or_else(|| "–".to_owned(), |hz| figure(hz, 3));
-            format!("{hz} Hz ({})", sweep.name)
+/// A circle that is drawn: who drove it, and its errors.
+#[derive(Clone, Debug)]
+pub struct Around {
+    name: String,
+    axes: [usize; 2],
+    frequency_hz: f64,
+    radius_mm: f64,
+    /// Angle and deviation of the last revolution \[°, µm\].
+    deviations: Vec<(f64, f64)>,
+    /// Time and following error of the first axis \[ms, µm\].
+    following: Vec<(f64, f64)>,
+}
+
+impl Around {
+    /// What is drawn of a recording.
+    ///
+    /// # Errors
+    /// The feed was not held long enough.
+    pub fn of(name: &str, circle: &Circle, recording: &Recording) -> Result<Self, DriveError> {
+        let tick_s = recording.tick_s();
+        let turn_ticks = (1.0 / (circle.frequency_hz * tick_s)).round() as usize;
+        let points = deviations(recording, circle)?;
+        // One revolution, closed; the last one.
+        let last = points.len().saturating_sub(turn_ticks + 1);
+        let degrees = |&(angle_rad, um): &(f64, f64)| (angle_rad.to_degrees(), um);
+        let [first, _] = circle.axes();
+        let over_time = |(tick, row): (usize, &crate::trace::TraceRow)| {
+            (tick as f64 * tick_s * 1e3, row.axes[first].err_um)
+        };
+        let shown_ticks = ((2.0 / circle.frequency_hz).min(SHOWN_S) / tick_s) as usize + 1;
+        Ok(Self {
+            name: name.to_owned(),
+            axes: circle.axes(),
+            frequency_hz: circle.frequency_hz,
+            radius_mm: circle.radius_mm(),
+            deviations: points.iter().skip(last).map(degrees).collect(),
+            following: circle
+                .measured(recording)?
+                .iter()
+                .take(shown_ticks)
+                .enumerate()
+                .map(over_time)
+                .collect(),
         })
-        .collect();
-    let sentence = format!(
-        "<strong>Contour error ≤ {} µm up to</strong> {}.",
-        figure(limit_um, 3),
-        escape(&passed.join(", "))
+    }
+
+    pub(super) fn is_at(&self, axes: [usize; 2], frequency_hz: f64) -> bool {
+        self.axes == axes && self.frequency_hz.total_cmp(&frequency_hz).is_eq()
+    }
+
+    pub(super) fn is_of_plane(&self, axes: [usize; 2]) -> bool {
+        self.axes == axes
+    }
+}
+
+/// Circles over frequency, and what acted.
+#[derive(Clone, Debug)]
+pub struct CircleSweep<'a> {
+    /// What acted.
+    pub name: &'a str,
+    /// Its circles.
+    pub circles: &'a [CircleFigures],
+}
+
+/// Error bands, form deviation and following error over frequency.
+#[must_use]
+pub fn circle_figures(machine: &Machine, sweeps: &[CircleSweep<'_>], limit_um: f64) -> Stack {
+    let [first, _] = axis_names(machine, sweeps);
+    let curves = |words: &str, value: fn(&CircleFigures) -> f64| -> Vec<Series> {
+        let of = |(index, sweep): (usize, &CircleSweep<'_>)| {
+            let points = sweep.circles.iter().map(|circle| (circle.frequency_hz, value(circle))).collect();
+            Series::curve(format!("{}{words}", sweep.name), palette::series(index), points)
+        };
+        sweeps.iter().enumerate().map(of).collect()
+    };
+    let mut bands = curves(", greatest", |circle| circle.contour_um_max);
+    bands.extend(curves(", least", |circle| circle.contour_um_min));
+    let all = sweeps.iter().flat_map(|sweep| sweep.circles).map(|circle| circle.frequency_hz);
+    let graphs = vec![
+        Graph::new("Contour error", "µm", bands).with_levels(&[limit_um, -limit_um]),
+        Graph::new("Form deviation", "µm", curves("", CircleFigures::form_um)),
+        Graph::new(
+            format!("Following error of {first}, greatest"),
+            "µm",
+            curves("", |circle| circle.following_um[0]),
+        ),
+    ];
+    let words = format!(
+        "Contour error is the actual less the programmed radius: each has a curve of its greatest and one of its least value. \
+         Dashed: ±{} µm.",
+        figure(limit_um, 3)
     );
-    super::open(&title, machine, &sentence, comparisons, out)?;
-    over_frequency(machine, sweeps, limit_um, out)?;
-    let mut frequencies_hz: Vec<f64> = Vec::new();
-    for (_, circle, _) in shown {
-        if !frequencies_hz.iter().any(|hz| hz.total_cmp(&circle.frequency_hz).is_eq()) {
-            frequencies_hz.push(circle.frequency_hz);
+    Stack::new("Errors over frequency", Axis::new("Frequency", "Hz"), ends_of(all), graphs).with_words(words)
+}
+
+/// The error around a circle, magnified, and the following error over two revolutions. All circles are of the same frequency.
+pub(super) fn around(machine: &Machine, shown: &[&Around], limit_um: f64) -> [Figure; 2] {
+    let of = |points: fn(&Around) -> &Vec<(f64, f64)>| -> Vec<Series> {
+        Series::numbered(shown.iter().map(|around| (around.name.clone(), points(around).clone())))
+    };
+    let (hz, radius_mm, axes) = shown
+        .first()
+        .map_or((1.0, 0.0, [0, 1]), |around| (around.frequency_hz, around.radius_mm, around.axes));
+    let polar = Polar {
+        title: format!("Contour error around the circle at {} Hz", figure(hz, 4)),
+        words: format!("Radius {} mm. Dashed: ±{} µm.", figure(radius_mm, 4), figure(limit_um, 3)),
+        radius_mm,
+        ring_um: limit_um,
+        axes: axes.map(|axis| machine.axes[axis].name.clone()),
+        series: of(|around| &around.deviations),
+    };
+    let name = name_of(machine, shown.iter().map(|around| around.axes[0]), "the first axis");
+    let graph = Graph::new(format!("Following error of {name}"), "µm", of(|around| &around.following));
+    let ends = (0.0, (2.0 / hz).min(SHOWN_S) * 1e3);
+    let title = format!("Over two revolutions at {} Hz", figure(hz, 4));
+    let over_time = Stack::new(title, Axis::new("Time", "ms"), ends, vec![graph]);
+    [polar.into(), over_time.into()]
+}
+
+/// The circles of each frequency, in the order of their appearance.
+fn by_frequency(shown: &[Around]) -> Vec<Vec<&Around>> {
+    let mut groups: Vec<Vec<&Around>> = Vec::new();
+    for around in shown {
+        let is_alike = |group: &&mut Vec<&Around>| {
+            group.iter().all(|other| other.frequency_hz.total_cmp(&around.frequency_hz).is_eq())
+        };
+        match groups.iter_mut().find(is_alike) {
+            Some(group) => group.push(around),
+            None => groups.push(vec![around]),
         }
     }
-    for (index, hz) in frequencies_hz.into_iter().enumerate() {
-        let of: Vec<&Shown> =
-            shown.iter().filter(|(_, circle, _)| circle.frequency_hz.total_cmp(&hz).is_eq()).collect();
-        one_frequency(machine, index, hz, limit_um, &of, out)?;
+    groups
+}
+
+/// What is drawn of circles in one plane, those of each frequency one over the other.
+#[must_use]
+pub fn circle_around(machine: &Machine, shown: &[Around], limit_um: f64) -> Vec<Figure> {
+    by_frequency(shown).iter().flat_map(|of| around(machine, of, limit_um)).collect()
+}
+
+/// The page of the circle test; `limits_hz` are the frequencies up to which the error stays within `limit_um`.
+#[must_use]
+pub fn circle_findings(
+    machine: &Machine,
+    sweeps: &[CircleSweep<'_>],
+    (limits_hz, limit_um): (&[Option<f64>], f64),
+    shown: &[Around],
+    comparisons: &[Comparison],
+) -> Findings {
+    let feed_m_min =
+        sweeps.iter().flat_map(|sweep| sweep.circles).next().map_or(0.0, |figures| figures.feed_mm_s * 0.06);
+    let title = format!("Circle test at {} m/min", figure(feed_m_min, 4));
+    let passed = |(sweep, hz): (&CircleSweep<'_>, &Option<f64>)| {
+        let hz = hz.map_or_else(|| "–".to_owned(), |hz| figure(hz, 3));
+        format!("{hz} Hz ({})", sweep.name)
+    };
+    let passed: Vec<String> = sweeps.iter().zip(limits_hz).map(passed).collect();
+    let bold = format!("Contour error ≤ {} µm up to", figure(limit_um, 3));
+    let mut findings = open(&title, machine, [&bold, &format!("{}.", passed.join(", "))], comparisons);
+    findings.section("Errors over frequency");
+    findings.figure(circle_figures(machine, sweeps, limit_um));
+    for of in by_frequency(shown) {
+        findings
+            .section(&format!("At {} Hz", figure(of.first().map_or(0.0, |around| around.frequency_hz), 4)));
+        findings.figures(around(machine, &of, limit_um));
     }
-    writeln!(out, "<section><h2>Figures</h2>")?;
+    findings.section("Figures");
     let rows = sweeps.iter().flat_map(|sweep| sweep.circles.iter().map(|circle| row(sweep.name, circle)));
-    let [first, second] = axis_names(machine, sweeps).map(|name| format!("following {name} [µm]"));
+    let [first, second] = axis_names(machine, sweeps).map(|name| format!("Following {name} [µm]"));
     let headings = [
-        "feedforward, frequency",
-        "radius [mm]",
-        "contour max [µm]",
-        "min [µm]",
-        "form deviation [µm]",
+        "*Feedforward, frequency",
+        "Radius [mm]",
+        "Contour max [µm]",
+        "Contour min [µm]",
+        "Form deviation [µm]",
         first.as_str(),
         second.as_str(),
     ];
-    table(&headings, rows, out)?;
-    writeln!(out, "</section>")?;
-    super::close(out)
+    findings.table("Circles", &headings, rows);
+    findings
 }
 
 /// The names of the two axes that all circles have in common.
-fn axis_names(machine: &Machine, sweeps: &[Sweep]) -> [String; 2] {
-    let circles = || sweeps.iter().flat_map(|sweep| &sweep.circles);
+fn axis_names(machine: &Machine, sweeps: &[CircleSweep<'_>]) -> [String; 2] {
+    let circles = || sweeps.iter().flat_map(|sweep| sweep.circles);
     [
         name_of(machine, circles().map(|circle| circle.axes[0]), "the first axis"),
         name_of(machine, circles().map(|circle| circle.axes[1]), "the second axis"),
@@ -102,108 +227,4 @@ fn row(name: &str, circle: &CircleFigures) -> Vec<String> {
         fixed(circle.following_um[0], 2),
         fixed(circle.following_um[1], 2),
     ]
-}
-
-/// Error bands and form deviation over frequency.
-fn over_frequency(
-    machine: &Machine,
-    sweeps: &[Sweep],
-    limit_um: f64,
-    out: &mut impl Write,
-) -> io::Result<()> {
-    let [first, _] = axis_names(machine, sweeps);
-    let curves = |value: fn(&CircleFigures) -> f64| -> Vec<Series> {
-        let points =
-            |sweep: &Sweep| sweep.circles.iter().map(|circle| (circle.frequency_hz, value(circle))).collect();
-        sweeps
-            .iter()
-            .enumerate()
-            .map(|(index, sweep)| Series { ink: palette::series(index), points: points(sweep) })
-            .collect()
-    };
-    let mut bands = curves(|circle| circle.contour_um_max);
-    bands.extend(curves(|circle| circle.contour_um_min));
-    let all = || sweeps.iter().flat_map(|sweep| &sweep.circles).map(|circle| circle.frequency_hz);
-    let (from, to) = (all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max));
-    let graph = |title: &str, series, levels| Graph { title: title.to_owned(), y: None, series, levels };
-    let stack = Stack {
-        x: if to > from { (from, to) } else { (0.0, 2.0 * to.max(0.5)) },
-        x_name: "frequency [Hz]",
-        is_logarithmic: false,
-        graphs: vec![
-            graph("Contour error, greatest and least [µm]", bands, vec![limit_um, -limit_um]),
-            graph("Form deviation [µm]", curves(CircleFigures::form_um), Vec::new()),
-            graph(
-                &format!("Following error of {first}, greatest [µm]"),
-                curves(|circle| circle.following_um[0]),
-                Vec::new(),
-            ),
-        ],
-    };
-    let caption = Caption {
-        id: "bands",
-        title: "Errors of the circle over frequency",
-        description: "Greatest and least contour error, form deviation and following error over frequency.",
-    };
-    let mut words = legend(sweeps.iter().map(|sweep| sweep.name.to_owned()));
-    words.push((palette::LIMIT, format!("±{} µm", figure(limit_um, 3))));
-    let remark = "Actual less programmed radius: each feedforward has a curve of its greatest and one of its least value.";
-    writeln!(out, "<section><h2>Errors over frequency</h2>")?;
-    figure_html(&stack.draw(&caption)?, &words, remark, out)?;
-    writeln!(out, "</section>")
-}
-
-/// The circle with its error magnified, and the following error over two revolutions.
-fn one_frequency(
-    machine: &Machine,
-    index: usize,
-    frequency_hz: f64,
-    limit_um: f64,
-    shown: &[&Shown],
-    out: &mut impl Write,
-) -> io::Result<()> {
-    let hz = figure(frequency_hz, 4);
-    let (mut around, mut following) = (Vec::new(), Vec::new());
-    let mut radius_mm = 0.0;
-    for (index, (_, circle, recording)) in shown.iter().enumerate() {
-        let ink = palette::series(index);
-        radius_mm = circle.radius_mm();
-        let revolution_ticks = (1.0 / (frequency_hz * recording.tick_s())).round() as usize;
-        let points = deviations(recording, circle).map_err(io::Error::other)?;
-        // One revolution, closed; the last one.
-        let last = points.len().saturating_sub(revolution_ticks + 1);
-        around.push(Series { ink, points: points[last..].to_vec() });
-        let ticks = circle.measured(recording).map_err(io::Error::other)?;
-        let [x, _] = circle.axes();
-        let over_time = |(tick, trace): (usize, &crate::trace::TraceRow)| {
-            (tick as f64 * recording.tick_s() * 1e3, trace.axes[x].err_um)
-        };
-        following.push(Series { ink, points: ticks.iter().enumerate().map(over_time).collect() });
-    }
-    let words = legend(shown.iter().map(|(name, _, _)| (*name).to_owned()));
-    writeln!(out, "<section><h2>At {hz} Hz: radius {} mm</h2>", figure(radius_mm, 4))?;
-    let title = format!("Contour error around the circle at {hz} Hz, magnified");
-    let caption = Caption { id: &format!("polar{index}"), title: &title, description: &title };
-    let mut rings = words.clone();
-    rings.push((palette::AXIS, "programmed circle".to_owned()));
-    rings.push((palette::LIMIT, format!("±{} µm", figure(limit_um, 3))));
-    let remark = "The error is magnified, the circle is not to scale with it: the rings show how much.";
-    figure_html(&polar::draw(&around, limit_um, &caption)?, &rings, remark, out)?;
-    let name = name_of(machine, shown.iter().map(|(_, circle, _)| circle.axes()[0]), "the first axis");
-    let graph = Graph {
-        title: format!("Following error of {name} [µm]"),
-        y: None,
-        series: following,
-        levels: Vec::new(),
-    };
-    let stack = Stack {
-        x: (0.0, (2e3 / frequency_hz).min(1e3)),
-        x_name: "time [ms]",
-        is_logarithmic: false,
-        graphs: vec![graph],
-    };
-    let title = format!("Following error at {hz} Hz");
-    let caption = Caption { id: &format!("following{index}"), title: &title, description: &title };
-    figure_html(&stack.draw(&caption)?, &words, "", out)?;
-    writeln!(out, "</section>")
 }

@@ -1,57 +1,61 @@
 //! Reports of the drive experiments: the curves from which their figures are read.
 //!
-//! Consumes recordings and figures of [`drive`](crate::drive); produces one self-contained page each, like
-//! the report of a run. Fails only if the output cannot be written.
+//! Consumes recordings and figures of [`drive`](crate::drive); produces a [`Findings`] each. What draws an experiment draws it for
+//! a report and for the page that makes experiments itself.
 
-mod circle;
+#[cfg(feature = "terminal")]
 mod compare;
+mod bode;
+mod circle;
 mod harmonic;
+mod inertia;
 mod step;
+mod tune;
 
-use std::io::{self, Write};
+pub use self::bode::bode_findings;
+pub use self::circle::{
+    Around, CIRCLE_LIMIT_UM, CircleSweep, circle_around, circle_figures, circle_findings,
+};
+#[cfg(feature = "terminal")]
+pub use self::compare::{Outputs, compare_findings, picture_of_errors, picture_of_outputs};
+pub use self::harmonic::{harmonic_figures, harmonic_findings};
+pub use self::inertia::{inertia_figure, inertia_findings};
+pub use self::step::{step_figures, step_findings};
+pub use self::tune::{Circles, LearntRow, NotDriven, TunedAxis, Tuning, tune_figures, tune_findings};
 
-pub use self::circle::{Shown, write_circle};
-pub use self::compare::{Outputs, picture_of_errors, picture_of_outputs, write_compare};
-pub use self::harmonic::{write_bode, write_harmonic, write_inertia};
-pub use self::step::write_step;
-
-use super::format::{escape, fixed};
-use super::head;
-use super::palette::{self, Ink};
+use super::figure::{Axis, Graph, Series, Stack};
+use super::findings::{Findings, Verdict};
+use super::format::fixed;
 use crate::drive::reference::Comparison;
 use crate::machine::Machine;
 
-/// Opens the page: title, machine, the outcome in a sentence.
-fn open(
-    title: &str,
-    machine: &Machine,
-    sentence: &str,
-    comparisons: &[Comparison],
-    out: &mut impl Write,
-) -> io::Result<()> {
-    head(title, out)?;
-    writeln!(out, "<header><h1>{}</h1>", escape(title))?;
-    writeln!(out, "<p class=\"machine\">Machine: {}</p>", escape(&machine.name))?;
+/// Amplitude at −3 dB.
+const HALF_POWER_DB: f64 = -3.0103;
+
+fn db(ratio: f64) -> f64 {
+    20.0 * ratio.log10()
+}
+
+/// Amplitude and phase over frequency.
+fn over_frequency(title: &str, ends: (f64, f64), amplitude: Vec<Series>, phase: Vec<Series>) -> Stack {
+    let amplitude = Graph::new("Amplitude", "dB", amplitude).with_levels(&[HALF_POWER_DB]);
+    let graphs = vec![amplitude, Graph::new("Phase", "°", phase)];
+    Stack::new(title, Axis::new("Frequency", "Hz"), ends, graphs).logarithmic()
+}
+
+/// Begins the page: title, machine, the outcome in a sentence, and how it compares with the reference machine's figures.
+fn open(title: &str, machine: &Machine, [bold, rest]: [&str; 2], comparisons: &[Comparison]) -> Findings {
     let missed = comparisons.iter().filter(|comparison| !comparison.holds()).count();
-    let (class, verdict) = match (comparisons.len(), missed) {
-        (0, _) => ("done", String::new()),
-        (all, 0) => ("done", format!(" All {all} figures of the reference machine hold.")),
+    let (verdict, compared) = match (comparisons.len(), missed) {
+        (0, _) => (Verdict::Done, String::new()),
+        (all, 0) => (Verdict::Done, format!(" All {all} figures of the reference machine hold.")),
         (all, missed) => {
-            ("faulted", format!(" {missed} of {all} figures of the reference machine are missed."))
+            (Verdict::Failed, format!(" {missed} of {all} figures of the reference machine are missed."))
         }
     };
-    writeln!(out, "<p class=\"result {class}\">{sentence}{verdict}</p></header>")?;
-    comparison_table(comparisons, out)
-}
-
-pub(super) fn close(out: &mut impl Write) -> io::Result<()> {
-    writeln!(out, "</main></body></html>")
-}
-
-/// A table of figures with the expected and the published ones; nothing if there are none.
-fn comparison_table(comparisons: &[Comparison], out: &mut impl Write) -> io::Result<()> {
+    let mut findings = Findings::new(title, &machine.name, verdict, [bold, &format!("{rest}{compared}")]);
     if comparisons.is_empty() {
-        return Ok(());
+        return findings;
     }
     let rows = comparisons.iter().map(|comparison| {
         let figure = &comparison.figure;
@@ -64,38 +68,28 @@ fn comparison_table(comparisons: &[Comparison], out: &mut impl Write) -> io::Res
             if comparison.holds() { "holds" } else { "missed" }.to_owned(),
         ]
     });
-    writeln!(out, "<h2>The reference machine’s figures</h2>")?;
-    table(&["figure", "measured", "expected", "±", "published", ""], rows, out)
+    findings.section("The reference machine’s figures");
+    findings.table("Figures", &["*Figure", "Measured", "Expected", "±", "Published", "*"], rows);
+    findings
 }
 
-/// A table whose first column names the row.
-pub(super) fn table(
-    headings: &[&str],
-    rows: impl Iterator<Item = Vec<String>>,
-    out: &mut impl Write,
-) -> io::Result<()> {
-    writeln!(out, "<div class=\"scroll\" tabindex=\"0\"><table><thead><tr>")?;
-    for (index, heading) in headings.iter().enumerate() {
-        let class = if index == 0 { " class=\"word\"" } else { "" };
-        write!(out, "<th scope=\"col\"{class}>{}</th>", escape(heading))?;
-    }
-    writeln!(out, "</tr></thead><tbody>")?;
-    for row in rows {
-        write!(out, "<tr>")?;
-        for (index, cell) in row.iter().enumerate() {
-            let cell = escape(cell);
-            if index == 0 {
-                write!(out, "<th scope=\"row\">{cell}</th>")?;
-            } else {
-                write!(out, "<td>{cell}</td>")?;
-            }
-        }
-        writeln!(out, "</tr>")?;
-    }
-    writeln!(out, "</tbody></table></div>")
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drive::reference::Figure;
 
-/// Names of series in the order of their inks.
-pub(super) fn legend(names: impl Iterator<Item = String>) -> Vec<(Ink, String)> {
-    names.enumerate().map(|(index, name)| (palette::series(index), name)).collect()
+    /// A figure that is missed makes the page red.
+    #[test]
+    fn missed_figures_are_told_in_red() {
+        let machine = Machine::reference();
+        let figure = Figure { quantity: "delay", unit: "ms", paper: 2.0, expected: 2.01, tolerance: 0.1 };
+        let page = |measured: f64| {
+            let findings = open("Step", &machine, ["Delay", "told."], &[Comparison { figure, measured }]);
+            findings.parts().0
+        };
+        let (holds, missed) = (page(2.05), page(2.2));
+        assert!(holds.contains("class=\"result done\"") && holds.contains("All 1 figures"), "{holds}");
+        assert!(missed.contains("class=\"result faulted\""), "{missed}");
+        assert!(missed.contains("1 of 1 figures of the reference machine are missed."), "{missed}");
+    }
 }

@@ -1,4 +1,4 @@
-//! The page of a run: `host/page`, with a run's data in it, as one file.
+//! The pages: `host/page`, with the data of a run or the figures of an experiment in it, as one file.
 //!
 //! The page's modules import each other by names that an import map gives to their text, so the file works without a server.
 //! What it says about the run in words and tables is made here, and is there without a script, too. The playground is the same
@@ -21,6 +21,8 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use serde::Serialize;
 
+use super::figure::Figure;
+use super::findings::Findings;
 use super::format::escape;
 use super::palette;
 use super::summary::Summary;
@@ -28,21 +30,34 @@ use super::{file_name, program_name};
 use crate::trace::RunTrace;
 
 const INDEX: &str = include_str!("../../../page/index.html");
+const WORKBENCH_SECTION: &str = include_str!("../../../page/workbench.html");
 const STYLE: &str = include_str!("../../../page/style.css");
 
 /// A module of a page: the name that others import it by, and its text.
 type Module = (&'static str, &'static str);
 
-/// What all pages have.
-const MODULES: [Module; 19] = [
+/// What draws figures.
+const FIGURES: [Module; 13] = [
+    ("page/data.js", include_str!("../../../page/data.js")),
     ("page/work.js", include_str!("../../../page/work.js")),
     ("page/format.js", include_str!("../../../page/format.js")),
-    ("page/data.js", include_str!("../../../page/data.js")),
+    ("page/theme.js", include_str!("../../../page/theme.js")),
+    ("page/sheet.js", include_str!("../../../page/sheet.js")),
+    ("page/dom.js", include_str!("../../../page/dom.js")),
+    ("page/figure.js", include_str!("../../../page/figure.js")),
+    ("page/span.js", include_str!("../../../page/span.js")),
+    ("page/axes.js", include_str!("../../../page/axes.js")),
+    ("page/input.js", include_str!("../../../page/input.js")),
+    ("page/stack.js", include_str!("../../../page/stack.js")),
+    ("page/flat.js", include_str!("../../../page/flat.js")),
+    ("page/figures.js", include_str!("../../../page/figures.js")),
+];
+
+/// What shows runs, besides.
+const WORKBENCH: [Module; 14] = [
     ("page/pyramid.js", include_str!("../../../page/pyramid.js")),
     ("page/run.js", include_str!("../../../page/run.js")),
     ("page/state.js", include_str!("../../../page/state.js")),
-    ("page/theme.js", include_str!("../../../page/theme.js")),
-    ("page/sheet.js", include_str!("../../../page/sheet.js")),
     ("page/columns.js", include_str!("../../../page/columns.js")),
     ("page/plot.js", include_str!("../../../page/plot.js")),
     ("page/overview.js", include_str!("../../../page/overview.js")),
@@ -55,6 +70,9 @@ const MODULES: [Module; 19] = [
     ("page/tables.js", include_str!("../../../page/tables.js")),
     ("page/workbench.js", include_str!("../../../page/workbench.js")),
 ];
+
+/// What starts a page of figures.
+const FINDINGS: [Module; 1] = [("page/findings.js", include_str!("../../../page/findings.js"))];
 
 /// What a report has, the last one to start it.
 const REPORT: [Module; 2] = [
@@ -131,18 +149,21 @@ impl PageRun {
     }
 }
 
-/// Writes the page of a run, `headline` first; with another run beside it, if there is one.
+/// Writes the page of a run, `headline` first; with another run beside it, and findings below it, if there are such.
 pub(super) fn write<const N: usize>(
     trace: &RunTrace<N>,
     summary: &Summary,
     headline: &str,
     against: Option<&PageRun>,
+    below: Option<Findings>,
     out: &mut impl Write,
 ) -> io::Result<()> {
+    let (below, figures) = below.map(Findings::parts).unwrap_or_default();
     let run = PageRun::with_summary(trace, summary)?;
     let title = format!("{} – motion report", file_name(program_name(trace)));
-    let page = Page { title: &title, modules: &REPORT, tools: "", headline };
+    let page = Page { headline, below: &below, ..Page::of_runs(&title, &REPORT, "") };
     page.write(out, |out| {
+        embed_figures(&figures, out)?;
         for (role, run) in [("", Some(&run)), ("against-", against)] {
             let Some(run) = run else { continue };
             embed(&format!("{role}run"), &run.data, out)?;
@@ -154,10 +175,28 @@ pub(super) fn write<const N: usize>(
     })
 }
 
+/// Writes a page of figures: words and tables with the figures' places, and the figures.
+pub(super) fn write_figures(
+    title: &str,
+    html: &str,
+    figures: &[Figure],
+    out: &mut impl Write,
+) -> io::Result<()> {
+    let page = Page { title, modules: &FINDINGS, has_runs: false, tools: "", headline: html, below: "" };
+    page.write(out, |out| embed_figures(figures, out))
+}
+
+fn embed_figures(figures: &[Figure], out: &mut impl Write) -> io::Result<()> {
+    if figures.is_empty() {
+        return Ok(());
+    }
+    embed("figures", &data::compressed(&[&serde_json::to_vec(figures)?])?, out)
+}
+
 /// The panel's page, without data: it asks its server for them.
 pub(super) fn panel() -> String {
     let tools = format!("<style>\n{PANEL_STYLE}</style>\n{PANEL_CONTROLS}");
-    let page = Page { title: "motion panel", modules: &PANEL, tools: &tools, headline: "" };
+    let page = Page::of_runs("motion panel", &PANEL, &tools);
     let mut written = Vec::new();
     page.write(&mut written, |_| Ok(())).expect("memory takes all");
     String::from_utf8(written).expect("all of it is text")
@@ -166,15 +205,24 @@ pub(super) fn panel() -> String {
 /// What differs from page to page.
 struct Page<'a> {
     title: &'a str,
-    /// Besides [`MODULES`]; the last one starts the page.
+    /// Besides those of figures and of runs; the last one starts the page.
     modules: &'a [Module],
+    /// Whether it shows runs.
+    has_runs: bool,
     /// HTML above the headline.
     tools: &'a str,
     /// HTML.
     headline: &'a str,
+    /// HTML below the run.
+    below: &'a str,
 }
 
-impl Page<'_> {
+impl<'a> Page<'a> {
+    /// A page that shows runs.
+    fn of_runs(title: &'a str, modules: &'a [Module], tools: &'a str) -> Self {
+        Self { title, modules, has_runs: true, tools, headline: "", below: "" }
+    }
+
     /// Writes the page, with what `data` embeds.
     fn write<W: Write>(&self, out: &mut W, data: impl Fn(&mut W) -> io::Result<()>) -> io::Result<()> {
         let mut rest = INDEX;
@@ -185,8 +233,11 @@ impl Page<'_> {
             match name {
                 "title" => out.write_all(escape(self.title).as_bytes())?,
                 "style" => write!(out, "{STYLE}{}", palette::variables())?,
-                "modules" => out.write_all(import_map(self.modules).as_bytes())?,
+                "modules" => out.write_all(self.import_map().as_bytes())?,
                 "tools" => out.write_all(self.tools.as_bytes())?,
+                "workbench" if self.has_runs => out.write_all(WORKBENCH_SECTION.as_bytes())?,
+                "workbench" => {}
+                "below" => out.write_all(self.below.as_bytes())?,
                 "headline" => out.write_all(self.headline.as_bytes())?,
                 "start" => out.write_all(self.modules.last().map_or("", |(name, _)| name).as_bytes())?,
                 _ => data(out)?,
@@ -195,19 +246,21 @@ impl Page<'_> {
         }
         out.write_all(rest.as_bytes())
     }
-}
 
-/// Every module under its name, as an address that holds its text.
-fn import_map(modules: &[Module]) -> String {
-    let imports: serde_json::Map<String, serde_json::Value> = MODULES
-        .iter()
-        .chain(modules)
-        .map(|(name, text)| {
-            let address = format!("data:text/javascript;base64,{}", BASE64.encode(text));
-            ((*name).to_owned(), address.into())
-        })
-        .collect();
-    serde_json::json!({ "imports": imports }).to_string()
+    /// Every module under its name, as an address that holds its text.
+    fn import_map(&self) -> String {
+        let of_runs: &[Module] = if self.has_runs { &WORKBENCH } else { &[] };
+        let imports: serde_json::Map<String, serde_json::Value> = FIGURES
+            .iter()
+            .chain(of_runs)
+            .chain(self.modules)
+            .map(|(name, text)| {
+                let address = format!("data:text/javascript;base64,{}", BASE64.encode(text));
+                ((*name).to_owned(), address.into())
+            })
+            .collect();
+        serde_json::json!({ "imports": imports }).to_string()
+    }
 }
 
 fn embed(name: &str, bytes: &[u8], out: &mut impl Write) -> io::Result<()> {

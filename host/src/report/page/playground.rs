@@ -10,7 +10,7 @@ use super::{Module, Page, data, embed};
 const STYLE: &str = include_str!("../../../page/playground.css");
 const TOOLS: &str = include_str!("../../../page/playground.html");
 
-/// What it has besides [`MODULES`](super::MODULES). The worker is imported by none: its text becomes a worker.
+/// What it has besides what all pages of runs have. The worker is imported by none: its text becomes a worker.
 const PLAYGROUND: [Module; 4] = [
     ("page/worker.js", include_str!("../../../page/worker.js")),
     ("page/engine.js", include_str!("../../../page/engine.js")),
@@ -46,7 +46,7 @@ impl Playground<'_> {
         let module = data::compressed_to(Compression::best(), &[module])?;
         let title = "motion playground";
         let tools = format!("<style>\n{STYLE}</style>\n{TOOLS}");
-        let page = Page { title, modules: &PLAYGROUND, tools: &tools, headline: "" };
+        let page = Page::of_runs(title, &PLAYGROUND, &tools);
         page.write(out, |out| {
             embed("sheets", &sheets, out)?;
             embed("module", &module, out)
