@@ -1,8 +1,8 @@
 //! Gives the compiler the program and the linker the board's memory map and its scripts.
 //!
 //! The program is `common/program/stringer.bin`, or what `MOTION_PROGRAM` names. The map is the repository's
-//! `memory.x`, copied to where the linker looks, so that there is one. The linker also refuses an image with more initial
-//! values than a few bytes, and one with the link that reaches the sectors of the parameters.
+//! `memory.x`, copied to where the linker looks, so that there is one; with the link, it leaves sectors for parameters. The linker
+//! also refuses an image with more initial values than a few bytes.
 
 use std::env;
 use std::error::Error;
@@ -11,8 +11,9 @@ use std::path::PathBuf;
 
 const PROGRAM: &str = "../common/program/stringer.bin";
 const MEMORY: &str = "../../memory.x";
-/// Where a board on the link keeps its parameters: `PARAMETER_SECTORS` of `design_parameters.rs`.
-const PARAMETERS: u32 = 0x0804_0000;
+/// Where the code of a board on the link begins, behind its parameters: the end of `PARAMETER_SECTORS` of `design_parameters.rs`
+/// \[bytes from the begin of flash\].
+const CODE_BEGIN: u32 = 0xC000;
 /// Bytes of initial values that may be copied from flash at the start: the log's own. Whatever is big is initialised
 /// by code, or is all zeros.
 const DATA_MAX: u32 = 64;
@@ -31,17 +32,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     if env::var("CARGO_CFG_TARGET_ARCH")? != "arm" {
         return Ok(());
     }
-    fs::copy(MEMORY, out.join("memory.x"))?;
+    let mut memory = fs::read_to_string(MEMORY)?;
+    if env::var_os("CARGO_FEATURE_LINK").is_some() {
+        // The vectors are before the parameters, in sector 0; all else is behind them.
+        memory += &format!("_stext = ORIGIN(FLASH) + {CODE_BEGIN:#x};\n");
+    }
+    fs::write(out.join("memory.x"), memory)?;
     // The emulated board's model is no part of the firmware.
     let max = if env::var_os("CARGO_FEATURE_EMULATED").is_some() { DATA_MAX + 4096 } else { DATA_MAX };
-    let mut check =
-        format!("ASSERT(SIZEOF(.data) <= {max}, \"a static's initial value is not all zeros\");\n");
-    // What is emulated keeps them in memory.
-    if env::var_os("CARGO_FEATURE_LINK").is_some() && env::var_os("CARGO_FEATURE_EMULATED").is_none() {
-        check += &format!(
-            "ASSERT(LOADADDR(.data) + SIZEOF(.data) <= {PARAMETERS:#x}, \"the image reaches the sectors of the parameters\");\n"
-        );
-    }
+    let check = format!("ASSERT(SIZEOF(.data) <= {max}, \"a static's initial value is not all zeros\");\n");
     fs::write(out.join("data.x"), check)?;
     println!("cargo:rustc-link-search={}", out.display());
     // --nmagic: sections are not aligned to pages, which flash does not have.

@@ -6,10 +6,14 @@
 //! that is too low, it waits forever, with everything off.
 
 use defmt::info;
+#[cfg(feature = "link")]
+use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use motion_kernel::hal::Ad5754Output;
 use nucleo_f446re::design_parameters::{
     APB1_HZ, APB1_TIMER_HZ, APB2_HZ, APB2_TIMER_HZ, HSE_HZ, SPI_HZ, SYSCLK_HZ, WATCHDOG_MS,
 };
+#[cfg(feature = "link")]
+use stm32f4xx_hal::flash::UnlockedFlash;
 use stm32f4xx_hal::gpio::{Alternate, AnyPin, Input, Output, PA3, PA10, PB12, PC13, Pull, Speed};
 use stm32f4xx_hal::pac::rcc::csr;
 use stm32f4xx_hal::pac::{self, SPI2};
@@ -68,15 +72,52 @@ pub(crate) struct Board {
     pub(crate) line: Line,
 }
 
-/// The parameters; new ones are written to flash, which may take four seconds (DS10693, flash memory characteristics: erase of
-/// 128 KiB, byte by byte).
+/// The processor's flash where its sectors are small, for which the HAL has the size of the largest.
+#[cfg(feature = "link")]
+struct SmallSectors<'a>(UnlockedFlash<'a>);
+
+#[cfg(feature = "link")]
+impl ErrorType for SmallSectors<'_> {
+    type Error = stm32f4xx_hal::flash::Error;
+}
+
+#[cfg(feature = "link")]
+impl ReadNorFlash for SmallSectors<'_> {
+    const READ_SIZE: usize = UnlockedFlash::READ_SIZE;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+        self.0.read(offset, bytes)
+    }
+
+    fn capacity(&self) -> usize {
+        self.0.capacity()
+    }
+}
+
+#[cfg(feature = "link")]
+impl NorFlash for SmallSectors<'_> {
+    const WRITE_SIZE: usize = UnlockedFlash::WRITE_SIZE;
+    const ERASE_SIZE: usize = 16 * 1024;
+
+    /// Sector by sector, each of its own size.
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
+        NorFlash::erase(&mut self.0, from, to)
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
+        self.0.write(offset, bytes)
+    }
+}
+
+/// The parameters; new ones are written to flash, which takes 0.8 s at most (DS10693, flash memory characteristics: erase of
+/// 16 KiB, byte by byte).
 #[cfg(feature = "link")]
 fn stored_parameters(mut flash: pac::FLASH) -> &'static [u8] {
     use stm32f4xx_hal::flash::FlashExt;
 
     // The data cache does not see an erase: it is off meanwhile, and empty afterwards (RM0390, section 3.4.2).
     flash.acr().modify(|_, w| w.dcen().clear_bit());
-    let parameters = crate::stored::parameters(flash.unlocked());
+    let parameters = crate::stored::parameters(SmallSectors(flash.unlocked()));
     flash.acr().modify(|_, w| w.dcrst().set_bit());
     flash.acr().modify(|_, w| w.dcrst().clear_bit());
     flash.acr().modify(|_, w| w.dcen().set_bit());

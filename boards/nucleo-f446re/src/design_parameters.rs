@@ -190,10 +190,10 @@ pub const LINK_ERROR_BASIS_POINTS: i32 =
 pub const LINK_RING: usize = 4096;
 /// Most bytes of parameters that the board keeps: three axes of the reference machine take some 600.
 pub const PARAMETERS_MAX: usize = 1024;
-/// Where it keeps them: sectors 6 and 7, 128 KiB each, which firmware with the link may not reach (RM0390, table 5) \[bytes from
-/// the begin of flash\]. The emulated board's are memory.
+/// Where it keeps them: sectors 1 and 2, 16 KiB each, between the vectors and the code (RM0390, table 5) \[bytes from the begin of
+/// flash\]. The emulated board's are memory.
 pub const PARAMETER_SECTORS: core::ops::Range<u32> =
-    if cfg!(feature = "emulated") { 0..4096 } else { 0x4_0000..0x8_0000 };
+    if cfg!(feature = "emulated") { 0..4096 } else { 0x4000..0xC000 };
 /// Items that have room before live control takes them: what comes while an answer is under way.
 pub const LINK_ITEMS: usize = 16;
 

@@ -193,7 +193,7 @@ impl<const N: usize> Scoped<N> {
         }
         if let Some(page) = page {
             let trace = page.trace(self.program, &self.info, &summary, self.trigger.as_ref());
-            written.write("report", self.page, |file| report::write_html(&trace, None, file));
+            written.write("report", self.page, |file| report::write_html(&trace, None, None, file));
         }
         if !is_quiet {
             told(&summary, triggers, out).map_err(CliError::Output)?;

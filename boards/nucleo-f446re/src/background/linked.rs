@@ -73,11 +73,7 @@ impl Background {
             machine: machine.program.machine_checksum(),
         };
         let (pulse, homing) = (header.pulse, machine.homing);
-        (
-            Self { feeder: Some(feeder), pulse, homing, identity, parameters, button, port },
-            intake,
-            OfTick,
-        )
+        (Self { feeder: Some(feeder), pulse, homing, identity, parameters, button, port }, intake, OfTick)
     }
 
     /// Runs forever.
