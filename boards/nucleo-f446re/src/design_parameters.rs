@@ -193,7 +193,7 @@ pub const PARAMETERS_MAX: usize = 1024;
 /// Where it keeps them: sectors 1 and 2, 16 KiB each, between the vectors and the code (RM0390, table 5) \[bytes from the begin of
 /// flash\]. The emulated board's are memory.
 pub const PARAMETER_SECTORS: core::ops::Range<u32> =
-    if cfg!(feature = "emulated") { 0..4096 } else { 0x4000..0xC000 };
+    if cfg!(feature = "emulated") { 0..2 * 1088 } else { 0x4000..0xC000 };
 /// Items that have room before live control takes them: what comes while an answer is under way.
 pub const LINK_ITEMS: usize = 16;
 

@@ -45,16 +45,7 @@ fn home_finds_the_reference() {
 #[test]
 fn home_on_a_board() {
     let workspace = Workspace::new("home-on-a-board");
-    let file = workspace.stdout(&["machine"]);
-    let (before, homing) = file.split_once("#[axis.homing]").expect("homing");
-    let (homing, after) = homing.split_once("\n\n").expect("its end");
-    let homing = format!("[axis.homing]{homing}").replace("\n#", "\n").replace("\n ", "\n# ");
-    // Near, as time passes there.
-    let homing = homing.replace("closes_mm = -180.0", "closes_mm = -20.0");
-    let homing = homing
-        .replace("approach_mm_s = 2.0", "approach_mm_s = 20.0")
-        .replace("position_mm = -250.0", "position_mm = -27.5");
-    workspace.put("homed.toml", &[before, &homing, "\n\n", after].concat());
+    workspace.put("homed.toml", &workspace.near_homing());
     let home = ["home", "--machine", "homed.toml", "--json"];
     let there = workspace.json(&[&home[..], &["--axis", "X", "--port", "simulator", "--enable"]].concat());
     let here = workspace.json(&home);

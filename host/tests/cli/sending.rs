@@ -12,8 +12,13 @@ struct Board(Child, String);
 
 impl Board {
     fn start(workspace: &Workspace) -> Self {
+        Self::of_machine(workspace, &[])
+    }
+
+    fn of_machine(workspace: &Workspace, machine: &[&str]) -> Self {
         let mut child = workspace
             .command(&["board", "--listen", "127.0.0.1:0"])
+            .args(machine)
             .stdout(Stdio::piped())
             .spawn()
             .expect("a process");
@@ -268,6 +273,64 @@ fn a_program_is_gone_on_with_after_power_cuts() {
     // The place where journals are without the option.
     let (status, _, error) = outcome(&mut workspace.command(&["resume", "--port", &board.1]));
     assert!(status == Some(2) && error.contains("motion/tcp-127-0-0-1-"), "{status:?} {error}");
+}
+
+/// An axis with [axis.homing] has to be homed again on a board that was off, and one that was homed only afterwards has
+/// lost the zero that the program had.
+#[test]
+fn a_program_is_gone_on_with_where_the_machine_is_homed() {
+    let workspace = Workspace::new("resume-homed");
+    workspace.put("homed.toml", &workspace.near_homing());
+    let lines: String = (1..=60).map(|line| format!("G1 X{line} Y{}\n", line % 2)).collect();
+    workspace.put("part.ngc", &format!("G21 G90 G61 F1200\n{lines}M2\n"));
+    let machine = ["--machine", "homed.toml"];
+    let home = |port: &str| {
+        let home = ["home", "--port", port, "--enable", "--dead-man", "10"];
+        let (status, out, error) = outcome(workspace.command(&home).args(machine));
+        assert_eq!(status, Some(0), "{out} {error}");
+    };
+    let begin = |port: &str, journal: &str| {
+        let send = ["send", "part.ngc", "--port", port, "--enable", "--journal", journal];
+        let mut command = workspace.command(&send);
+        let sender = command.args(machine).stdin(Stdio::piped()).stdout(Stdio::null());
+        let mut sender = sender.spawn().expect("a process");
+        let has_driven = || {
+            let journal = std::fs::read(workspace.0.join(journal)).ok();
+            let record: Option<Value> = journal.and_then(|text| serde_json::from_slice(&text).ok());
+            record.is_some_and(|record| record["driven"].as_u64().expect("a count") >= 4)
+        };
+        while !has_driven() {
+            assert_eq!(sender.try_wait().expect("a process"), None, "before it was killed");
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        sender.kill().expect("it runs");
+        sender.wait().expect("an end");
+    };
+    let resume = |port: &str, journal: &str, more: &[&str]| {
+        let resume = ["resume", journal, "--port", port, "--yes", "--enable", "--homed"];
+        outcome(workspace.command(&resume).args(more))
+    };
+    let board = Board::of_machine(&workspace, &machine);
+    begin(&board.1, "before.journal");
+    drop(board);
+    let board = Board::of_machine(&workspace, &machine);
+    home(&board.1);
+    let (status, _, error) = resume(&board.1, "before.journal", &[]);
+    assert!(status == Some(2) && error.contains("driven before axis X was homed"), "{status:?} {error}");
+    begin(&board.1, "homed.journal");
+    drop(board);
+    let board = Board::of_machine(&workspace, &machine);
+    let (status, _, error) = resume(&board.1, "homed.journal", &[]);
+    assert!(status == Some(2) && error.contains("found axis X not homed"), "{status:?} {error}");
+    home(&board.1);
+    let (status, out, error) = resume(&board.1, "homed.journal", &[]);
+    assert_eq!(status, Some(0), "{out} {error}");
+    assert!(out.contains("idle at X 60.000 Y 0.000"), "{out}");
+    // Whoever knows better says so.
+    drop(board);
+    let board = Board::of_machine(&workspace, &machine);
+    let (status, out, error) = resume(&board.1, "before.journal", &["--ignore-homing"]);
+    assert_eq!(status, Some(0), "{out} {error}");
 }
 
 /// Jog keys of a machine on a board.

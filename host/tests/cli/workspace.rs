@@ -29,6 +29,21 @@ impl Workspace {
         fs::read_to_string(self.0.join(name)).expect("a file")
     }
 
+    /// The machine file that `motion machine` prints, with the homing of X that it has commented out; near, as on a board time
+    /// passes.
+    pub(crate) fn near_homing(&self) -> String {
+        let file = self.stdout(&["machine"]);
+        let (before, homing) = file.split_once("#[axis.homing]").expect("homing");
+        let (homing, after) = homing.split_once("\n\n").expect("its end");
+        let homing = format!("[axis.homing]{homing}")
+            .replace("\n#", "\n")
+            .replace("\n ", "\n# ")
+            .replace("closes_mm = -180.0", "closes_mm = -20.0")
+            .replace("approach_mm_s = 2.0", "approach_mm_s = 20.0")
+            .replace("position_mm = -250.0", "position_mm = -27.5");
+        [before, &homing, "\n\n", after].concat()
+    }
+
     /// The figures of a page, as its script reads them.
     pub(crate) fn figures(&self, page: &str) -> Vec<Value> {
         let page = self.read(page);

@@ -4,7 +4,8 @@ use core::sync::atomic::{AtomicU8, Ordering};
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash};
 
-const SECTOR: usize = 2048;
+/// With room for the longest record alone, as memory is short.
+const SECTOR: usize = 1088;
 const BYTES: usize = 2 * SECTOR;
 
 // Not initialised, as flash.
