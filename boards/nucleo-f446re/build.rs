@@ -42,6 +42,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let max = if env::var_os("CARGO_FEATURE_EMULATED").is_some() { DATA_MAX + 4096 } else { DATA_MAX };
     let check = format!("ASSERT(SIZEOF(.data) <= {max}, \"a static's initial value is not all zeros\");\n");
     fs::write(out.join("data.x"), check)?;
+    println!("cargo:rustc-env=MOTION_CODE_BEGIN={CODE_BEGIN}");
     println!("cargo:rustc-link-search={}", out.display());
     // --nmagic: sections are not aligned to pages, which flash does not have.
     for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x", "-Tdata.x"] {

@@ -87,7 +87,8 @@ impl SimHome {
 
 /// The first index that was reached between two counts: the same count from either side.
 fn first_index(Counts(before): Counts, Counts(now): Counts, revolution: i64, at: Counts) -> Option<Counts> {
-    let revolutions = |counts: i64| (counts - at.0).div_euclid(revolution);
+    // A revolution has a count at least.
+    let revolutions = |counts: i64| (counts - at.0).checked_div_euclid(revolution).unwrap_or_default();
     if now > before {
         let next = (revolutions(before) + 1) * revolution + at.0;
         (next <= now).then_some(Counts(next))

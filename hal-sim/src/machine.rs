@@ -171,6 +171,14 @@ impl<const AXES: usize, const LINE: usize, const CHIPS: usize> SimMachine<AXES, 
         }
     }
 
+    /// The true position of an axis, for switches there \[mm\]; none if there is no such axis. Without a panic, for images that
+    /// have none.
+    #[must_use]
+    pub fn position_mm(&self, axis: usize) -> Option<f64> {
+        let axes = self.axes.try_borrow().ok()?;
+        Some(axes.get(axis)?.drive().position_mm())
+    }
+
     /// The true state of all axes, for tests and records.
     #[must_use]
     pub fn truth(&self) -> [AxisTruth; AXES] {

@@ -691,15 +691,17 @@ fn homing_of_an_asker_that_is_gone_ends_at_rest() {
         assert!(begin.elapsed() < LONGEST, "{:?}", connection.status());
         connection.step(Duration::from_millis(1), &mut |_| {});
         if let Some(status) = connection.status()
-            && let HomingProgress::Failed { failure, .. } = status.homing
+            && let HomingProgress::Failed { failure, axis } = status.homing
         {
+            // On a busy machine the next one may come when X is homed already.
+            assert!(status.homed[usize::from(axis)..].iter().all(Option::is_none), "{status:?}");
             break failure;
         }
     };
     // By the silence, or by the next one's question.
     assert!(matches!(failed, HomingFailure::Silent | HomingFailure::Aborted), "{failed:?}");
     let status = *connection.status().expect("told");
-    assert_eq!((status.state, status.homed), (State::Held, [None; 3]));
+    assert_eq!(status.state, State::Held);
 }
 
 /// Where X stands, as told last \[mm\].

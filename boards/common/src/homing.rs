@@ -126,11 +126,19 @@ impl<const AXES: usize> BoardHoming<AXES> {
         is_first
     }
 
-    /// The machine is at rest after an abort.
-    pub(crate) fn rests(&mut self) {
-        if let Stage::Ends(failure) = self.stage {
+    /// Was asked for `axes`, and to end it, before it began.
+    pub(crate) fn give_up(&mut self, axes: u16, failure: HomingFailure) {
+        if !self.is_under_way() {
+            self.axis = (axes.trailing_zeros() as usize).min(AXES.saturating_sub(1));
             self.fail(failure);
         }
+    }
+
+    /// The machine is at rest after an abort; whether that was what homing waited for.
+    pub(crate) fn rests(&mut self) -> bool {
+        let Stage::Ends(failure) = self.stage else { return false };
+        self.fail(failure);
+        true
     }
 
     /// Has ended.

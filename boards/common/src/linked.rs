@@ -213,6 +213,9 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
             };
             if requests.clears_fault {
                 note(Command::ClearFault);
+                if let Some(Fault { kind, .. }) = control.kernel.fault() {
+                    forget_lost(&kind, homing);
+                }
                 if control.kernel.clear_fault().is_some() {
                     control.flight.clear();
                 }
@@ -239,7 +242,9 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
             }
             if let Some(here) = here {
                 streamed.restart(&mut control.intake, here, tick);
-                homing.rests();
+                if homing.rests() {
+                    control.forget_index();
+                }
             }
             here.is_some()
         })
@@ -259,8 +264,10 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
         if failure.is_some_and(|failure| homing.end(failure)) {
             streamed.abort();
         }
-        if let Some(axes) = requests.homes {
-            homing.ask(axes);
+        match requests.homes {
+            Some(axes) if requests.may_home => homing.ask(axes),
+            Some(axes) => homing.give_up(axes, failure.unwrap_or(HomingFailure::Aborted)),
+            None => {}
         }
     }
 
@@ -276,6 +283,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
             if let Some(Fault { kind, .. }) = control.kernel.fault() {
                 forget_lost(&kind, homing);
                 if homing.is_under_way() {
+                    control.forget_index();
                     homing.fail(HomingFailure::Fault);
                 }
             }
@@ -283,6 +291,7 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
                 return;
             }
             if control.kernel.is_off() {
+                control.forget_index();
                 return homing.fail(HomingFailure::DrivesOff);
             }
             if !control.kernel.is_on() {
@@ -325,10 +334,12 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
                 Ok(HomingStep::Move(jog)) => rest(Some(Some(jog)), streamed, control, tick),
                 Ok(HomingStep::Reference(counts, position)) => {
                     control.forget_index();
-                    if let Some(set) = control.kernel.reference(axis, counts, position) {
-                        note(streamed, tick, Command::Reference { axis: axis as u16, counts, position });
-                        streamed.restart_homing(None, &mut control.intake, set, tick);
-                    }
+                    let Some(set) = control.kernel.reference(axis, counts, position) else {
+                        homing.fail(HomingFailure::Failed);
+                        return streamed.abort();
+                    };
+                    note(streamed, tick, Command::Reference { axis: axis as u16, counts, position });
+                    streamed.restart_homing(None, &mut control.intake, set, tick);
                 }
                 Ok(HomingStep::Done(homed)) => {
                     homing.found(homed);
@@ -1171,6 +1182,8 @@ mod tests {
                 }
                 1 if told.is_some_and(|status| status.state == State::Held) => {
                     assert!(operator.host.home(axes, dead_man_ms));
+                    // Before it is sent.
+                    meanwhile(0, operator);
                     (step, since) = (2, now);
                 }
                 2 => {
@@ -1232,7 +1245,7 @@ mod tests {
     /// Whatever ends homing, at any time, ends it at rest and by its name; the axes before stay homed.
     #[test]
     fn what_ends_homing_early_is_named() {
-        for at in [1, 300, 900, 2000, 3500, 5000] {
+        for at in [0, 1, 300, 900, 2000, 3500, 5000] {
             println!("after {at} ticks");
             let ended = |does: &mut dyn FnMut(u32, &mut Operator)| {
                 let (progress, _, seen) =
@@ -1255,7 +1268,10 @@ mod tests {
             let button = ended(&mut |ticks, operator| operator.is_held = ticks >= at);
             assert_eq!(button, (HomingFailure::Aborted, Some(State::Held)));
             // Back long after the time.
-            let silent = ended(&mut |ticks, operator| operator.is_silent = (at..at + 2000).contains(&ticks));
+            let since = at.max(1);
+            let silent = ended(&mut |ticks, operator| {
+                operator.is_silent = (since..since + 2000).contains(&ticks);
+            });
             assert_eq!(silent, (HomingFailure::Silent, Some(State::Held)));
             let off = ended(&mut |ticks, operator| {
                 if ticks == at {

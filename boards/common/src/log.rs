@@ -25,8 +25,8 @@ pub enum Origin {
     Build,
     /// From the program that it was built with: those in flash are not for this firmware.
     Unsuitable(MachineError),
-    /// From the program that it was built with: flash can't be read or written.
-    NotStored(StoreError),
+    /// From the program that it was built with: flash can't be read.
+    Unreadable(StoreError),
 }
 
 /// A line of the log.
@@ -36,6 +36,8 @@ pub enum LogLine<R: Real, const AXES: usize> {
     Ready,
     /// The board waits for a PC on the link.
     Linked,
+    /// New parameters are not in flash; those before are.
+    NotStored(StoreError),
     /// Where the board's parameters are from.
     Parameters(Origin),
     /// A run starts from here.
@@ -107,9 +109,10 @@ pub fn write<R: Real + defmt::Format, const AXES: usize>(line: &LogLine<R, AXES>
         LogLine::Parameters(Origin::Unsuitable(error)) => {
             warn!("parameters: of the build, as those in flash are not for this firmware: {}", error)
         }
-        LogLine::Parameters(Origin::NotStored(error)) => {
-            error!("parameters: of the build, as flash keeps none: {}", error)
+        LogLine::Parameters(Origin::Unreadable(error)) => {
+            error!("parameters: of the build, as flash can't be read: {}", error)
         }
+        LogLine::NotStored(error) => error!("new parameters are not stored: {}", error),
         LogLine::Started(from) => info!("started: from {=[?]} mm", from.map(Position::to_mm)),
         LogLine::NotReady => warn!("not started: the emergency stop is open or a drive is not ready"),
         LogLine::Done => info!("done: press the start button to run again"),

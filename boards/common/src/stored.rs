@@ -1,7 +1,7 @@
 //! Parameters that a board keeps across power.
 //!
 //! Consumes records as they come over the link, and flash; produces the record that was stored last. A board takes a new one
-//! in three steps, so that flash is written while nothing else runs: an erase stops the processor of most boards for seconds.
+//! in three steps, so that flash is written while nothing else runs: an erase stops the processor of most boards, for up to seconds.
 //!
 //! 1. [`Pending::put`]: while the drives are off the record goes to memory that a reset leaves as it is; then the board
 //!    resets itself.

@@ -37,6 +37,8 @@ pub struct Requests {
     pub aborts: bool,
     /// The operator has these axes homed, the lowest bit is the first one's; what was under way is given up.
     pub homes: Option<u16>,
+    /// Nothing that ends it was pressed since.
+    pub(crate) may_home: bool,
 }
 
 /// Where items come from: over the link, or of a move of homing.
@@ -284,6 +286,8 @@ fn obey<R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize>(
         holds: is_pressed && controls.mode == Mode::Hold,
         aborts: controls.aborts != before.aborts,
         homes: (controls.homings != before.homings).then_some(controls.home_axes),
+        // What was pressed after it may have come with it.
+        may_home: controls.mode == Mode::Run && controls.dead_man_ms > 0,
     }
 }
 

@@ -9,6 +9,8 @@ use defmt::info;
 #[cfg(feature = "link")]
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use motion_kernel::hal::Ad5754Output;
+#[cfg(feature = "link")]
+use nucleo_f446re::design_parameters::PARAMETER_SECTORS;
 use nucleo_f446re::design_parameters::{
     APB1_HZ, APB1_TIMER_HZ, APB2_HZ, APB2_TIMER_HZ, HSE_HZ, SPI_HZ, SYSCLK_HZ, WATCHDOG_MS,
 };
@@ -71,6 +73,18 @@ pub(crate) struct Board {
     /// ST-LINK's serial port.
     pub(crate) line: Line,
 }
+
+/// Where the code begins, as the linker has it.
+#[cfg(feature = "link")]
+const CODE_BEGIN: u32 = match u32::from_str_radix(env!("MOTION_CODE_BEGIN"), 10) {
+    Ok(begin) => begin,
+    Err(_) => panic!("a number"),
+};
+#[cfg(feature = "link")]
+const _: () = assert!(
+    PARAMETER_SECTORS.end == CODE_BEGIN && PARAMETER_SECTORS.end <= 0x1_0000,
+    "parameters are before the code, in sectors of 16 KiB"
+);
 
 /// The processor's flash where its sectors are small, for which the HAL has the size of the largest.
 #[cfg(feature = "link")]

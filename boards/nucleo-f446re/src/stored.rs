@@ -34,10 +34,14 @@ pub(crate) fn parameters(flash: impl NorFlash) -> &'static [u8] {
     let mut place = [0; PARAMETERS_MAX];
     let came = PENDING.take(&mut place).filter(|record| suits(record).is_ok());
     let error = came.and_then(|record| store.write(record, buffer).err());
-    let (parameters, origin) = match (error, store.read(buffer)) {
-        (Some(error), _) | (None, Err(error)) => (PROGRAM, Origin::NotStored(error)),
-        (None, Ok(None)) => (PROGRAM, Origin::Build),
-        (None, Ok(Some(record))) => match suits(record) {
+    if let Some(error) = error {
+        // Those before are there.
+        board::write(&LogLine::<Number, AXES>::NotStored(error));
+    }
+    let (parameters, origin) = match store.read(buffer) {
+        Err(error) => (PROGRAM, Origin::Unreadable(error)),
+        Ok(None) => (PROGRAM, Origin::Build),
+        Ok(Some(record)) => match suits(record) {
             Ok(()) => (record, Origin::Flash),
             Err(error) => (PROGRAM, Origin::Unsuitable(error)),
         },

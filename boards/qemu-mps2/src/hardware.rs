@@ -44,22 +44,23 @@ impl Hardware {
     /// Gives every axis that is homed a switch, and an index where it looks for one: the switch is closed from a third of the
     /// search's length on, an index follows after half of the length within which it is looked for.
     pub fn add_homes(&mut self, header: &Header<AXES>, homing: &HomingFigures<AXES>, counts: [Counts; AXES]) {
-        let truth = self.machine.truth();
-        for (((home, axis), figures), (truth, counts)) in
-            self.homes.iter_mut().zip(&header.axes).zip(&homing.axes).zip(truth.iter().zip(counts))
+        let machine = self.machine;
+        for ((((number, home), axis), figures), counts) in
+            self.homes.iter_mut().enumerate().zip(&header.axes).zip(&homing.axes).zip(counts)
         {
+            let Some(position_mm) = machine.position_mm(number) else { continue };
             let Some(config) = figures.as_ref().map(|figures| &figures.config) else { continue };
             let sign = if config.direction == Direction::Positive { 1.0 } else { -1.0 };
-            let near_mm = truth.position_mm + sign * config.travel_mm / 3.0;
+            let near_mm = position_mm + sign * config.travel_mm / 3.0;
             let far_mm = near_mm + sign * config.back_off_mm;
             let index = config.index_mm.map(|index_mm| {
                 let counts_of = |mm: f64| (mm / axis.mm_per_count) as i64;
-                let at = Counts(counts.0 + counts_of(near_mm + sign * index_mm / 2.0 - truth.position_mm));
+                let at = Counts(counts.0 + counts_of(near_mm + sign * index_mm / 2.0 - position_mm));
                 IndexParameters { counts: counts_of(index_mm).abs().max(1), at }
             });
             let closes_mm = if sign > 0.0 { (near_mm, far_mm) } else { (far_mm, near_mm) };
             let switch = Some(SwitchParameters { closes_mm, hysteresis_mm: 0.2 });
-            *home = Some(SimHome::new(HomeParameters { switch, index }, truth.position_mm, counts));
+            *home = Some(SimHome::new(HomeParameters { switch, index }, position_mm, counts));
         }
     }
 
@@ -74,12 +75,11 @@ impl Encoder<AXES> for Hardware {
 
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
         let Ok(counts) = self.machine.latch();
-        if self.homes.iter().any(Option::is_some) {
-            let truth = self.machine.truth();
-            for ((home, truth), counts) in self.homes.iter_mut().zip(truth).zip(counts) {
-                if let Some(home) = home {
-                    home.advance(truth.position_mm, counts);
-                }
+        for ((number, home), counts) in self.homes.iter_mut().enumerate().zip(counts) {
+            if let Some(home) = home
+                && let Some(position_mm) = self.machine.position_mm(number)
+            {
+                home.advance(position_mm, counts);
             }
         }
         Ok(counts)

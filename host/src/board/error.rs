@@ -169,6 +169,16 @@ pub enum BoardError {
     /// The board does not take new parameters.
     #[error("found {}", refusal(.0))]
     Parameters(WriteError),
+    /// It was given parameters, and has started anew with others.
+    #[error(
+        "found a board that has started anew with the machine {found:08x}, expected {expected:08x}, which it was given"
+    )]
+    OtherMachine {
+        /// The checksum of its parameters.
+        found: u32,
+        /// Of those that it was given.
+        expected: u32,
+    },
     /// What it has are no parameters.
     #[error("found parameters on the board that can't be read: {0}")]
     NoParameters(ProgramError),
@@ -243,6 +253,7 @@ impl BoardError {
             | Self::FlightCleared
             | Self::NoFlight
             | Self::NoParameters(_)
+            | Self::OtherMachine { .. }
             | Self::Simulator(_)
             | Self::Scope(_)
             | Self::Push(_) => false,

@@ -40,9 +40,15 @@ impl Figures {
         let reader = Reader::<M>::new(record)?;
         let (header, guards): (&Header<M>, Option<Guards<M>>) = (reader.header(), reader.guards()?);
         let mut figures = Vec::new();
-        for value in [serde_json::to_value(header), serde_json::to_value(guards)] {
-            // Both are structs of numbers.
-            flatten("", &value.unwrap_or(Value::Null), &mut figures);
+        let homing = reader.homing()?;
+        let values = [
+            ("", serde_json::to_value(header)),
+            ("", serde_json::to_value(guards)),
+            ("homing", serde_json::to_value(homing)),
+        ];
+        for (name, value) in values {
+            // All are structs of numbers.
+            flatten(name, &value.unwrap_or(Value::Null), &mut figures);
         }
         Ok(Self(figures))
     }
@@ -125,7 +131,12 @@ pub fn write<const M: usize>(connection: &mut Connection<M>, record: &[u8]) -> R
         }
         Event::Restarted { .. } => {
             connection.accept();
-            Ok(connection.identity().copied().filter(|identity| identity.machine == machine))
+            match connection.identity() {
+                Some(identity) if identity.machine != machine => {
+                    Err(BoardError::OtherMachine { found: identity.machine, expected: machine })
+                }
+                identity => Ok(identity.copied()),
+            }
         }
         _ => Ok(None),
     })
