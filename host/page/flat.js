@@ -53,12 +53,27 @@ class Flat extends Figure {
     this.mark();
   }
 
+  /** Moves the cursor, and the view to show it. */
+  visit(place) {
+    this.moveTo(place, true);
+    const { axes, view } = this;
+    const spot = this.spot();
+    if (!spot || this.isSeen(spot)) return;
+    this.shift(spot[0] - (view.from + view.to) / 2, spot[1] - (axes.low + axes.high) / 2);
+  }
+
+  /** Whether a place is within the view. */
+  isSeen([x, y]) {
+    const { axes, view } = this;
+    return x >= view.from && x <= view.to && y >= axes.low && y <= axes.high;
+  }
+
   step(count) {
-    this.moveTo(this.cursor + count, true);
+    this.visit(this.cursor + count);
   }
 
   toEnd(isLast) {
-    this.moveTo(isLast ? this.places() - 1 : 0, true);
+    this.visit(isLast ? this.places() - 1 : 0);
   }
 
   shift(x, y) {
@@ -124,8 +139,9 @@ class Flat extends Figure {
     this.tell();
     const { axes } = this;
     const spot = axes.width ? this.spot() : null;
-    axes.line.hidden = !spot;
-    if (spot) axes.line.style.transform = `translate(${axes.px(spot[0])}px,${axes.py(spot[1])}px)`;
+    const isSeen = spot !== null && this.isSeen(spot);
+    axes.line.hidden = !isSeen;
+    if (isSeen) axes.line.style.transform = `translate(${axes.px(spot[0])}px,${axes.py(spot[1])}px)`;
   }
 
   /** A line through places, or dots. */

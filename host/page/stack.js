@@ -180,6 +180,10 @@ export class Stack extends Figure {
         low = Math.min(low, curve.y[i]);
         high = Math.max(high, curve.y[i]);
       }
+      // Between two points, the line is seen and neither of them.
+      for (const value of [curve.at(this.span.from), curve.at(this.span.to)]) {
+        if (!Number.isNaN(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
+      }
     }
     const magnitude = Math.max(-low, high);
     const shown = levels.filter((level) => magnitude >= LIMIT_SHOWN_FROM * Math.abs(level));

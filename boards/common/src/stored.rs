@@ -211,7 +211,9 @@ impl<const BYTES: usize> Pending<BYTES> {
 
     /// The record, in `place`, if there is one; then never again.
     pub fn take<'a>(&self, place: &'a mut [u8]) -> Option<&'a [u8]> {
-        let length = self.length.swap(0, Ordering::Relaxed) as usize;
+        // Not at once: small cores can't, and nothing else runs yet.
+        let length = self.length.load(Ordering::Relaxed) as usize;
+        self.length.store(0, Ordering::Relaxed);
         if length == 0 || length > BYTES {
             return None;
         }

@@ -70,6 +70,12 @@ pub(crate) fn the_cursor_reads_what_was_measured() {
     assert!(browser.number("figures[0].span.to") >= 2.0 - 1e-9, "the window follows the cursor");
     browser.keys("0");
     assert!((width() - 2.0).abs() < 1e-9);
+    // Between two points, of which none is seen, the lines still are.
+    browser.run("figures[0].span.show(0.3, 0.31)");
+    browser.after_frame("0");
+    let is_seen = "figures[0].graphs[0].curves.filter((curve) => !curve.isDots).every((curve) => \
+                   ((axes, y) => y > axes.low && y < axes.high)(figures[0].graphs[0].axes, curve.at(0.305)))";
+    assert!(browser.holds(is_seen));
     browser.close();
 }
 
@@ -107,6 +113,13 @@ pub(crate) fn circles_are_looked_into() {
     let now = spot(90.0);
     assert!((now[0] - at[0]).abs() < 1.5 && (now[1] - at[1]).abs() < 1.5, "{now:?} {at:?}");
     browser.drag(&[at]);
+    // The cursor's dot is nowhere else than in the picture, and keys bring it there.
+    browser.run("figures[1].shift(figures[1].home * 10, 0)");
+    browser.after_frame("0");
+    assert!(browser.holds("figures[1].axes.line.hidden"));
+    browser.keys(&RIGHT.to_string());
+    browser.after_frame("0");
+    assert!(!browser.holds("figures[1].axes.line.hidden"));
     browser.keys("0");
     browser.after_frame("0");
     assert!((width() - whole).abs() < 1e-9);
