@@ -58,12 +58,12 @@ class Flat extends Figure {
     this.moveTo(place, true);
     const { axes, view } = this;
     const spot = this.spot();
-    if (!spot || this.isSeen(spot)) return;
+    if (!spot || this.contains(spot)) return;
     this.shift(spot[0] - (view.from + view.to) / 2, spot[1] - (axes.low + axes.high) / 2);
   }
 
   /** Whether a place is within the view. */
-  isSeen([x, y]) {
+  contains([x, y]) {
     const { axes, view } = this;
     return x >= view.from && x <= view.to && y >= axes.low && y <= axes.high;
   }
@@ -139,9 +139,9 @@ class Flat extends Figure {
     this.tell();
     const { axes } = this;
     const spot = axes.width ? this.spot() : null;
-    const isSeen = spot !== null && this.isSeen(spot);
-    axes.line.hidden = !isSeen;
-    if (isSeen) axes.line.style.transform = `translate(${axes.px(spot[0])}px,${axes.py(spot[1])}px)`;
+    const isInside = spot !== null && this.contains(spot);
+    axes.line.hidden = !isInside;
+    if (isInside) axes.line.style.transform = `translate(${axes.px(spot[0])}px,${axes.py(spot[1])}px)`;
   }
 
   /** A line through places, or dots. */
