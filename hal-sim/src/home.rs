@@ -1,8 +1,11 @@
-//! Home switch and index pulse of a simulated axis.
+//! Home switches and index pulses of simulated axes.
 //!
-//! Consumes, once per tick, the axis' true position and its count; produces the state of the switch, and the
-//! count at the first index since the latch was armed. Constant cost, cannot fail.
+//! Consumes, once per tick, the axes' true positions and their counts; produces the state of each switch, and the
+//! count at the first index since a latch was armed. Constant cost, cannot fail.
 
+use core::convert::Infallible;
+
+use motion_kernel::hal::{IndexLatch, MachineInputs};
 use motion_kernel::units::Counts;
 
 /// A switch that is closed over a length of the travel.
@@ -82,6 +85,64 @@ impl SimHome {
     #[must_use]
     pub fn latched(&self) -> Option<Counts> {
         self.latched
+    }
+}
+
+/// The axes of a machine, with what those that can be homed have for it.
+#[derive(Clone, Debug)]
+pub struct SimHomes<const AXES: usize>([Option<SimHome>; AXES]);
+
+impl<const AXES: usize> SimHomes<AXES> {
+    /// No axis can be homed.
+    pub const NONE: Self = Self([const { None }; AXES]);
+
+    /// Those of each axis.
+    #[must_use]
+    pub const fn new(homes: [Option<SimHome>; AXES]) -> Self {
+        Self(homes)
+    }
+
+    /// The switch and index of an axis; none if it can't be homed.
+    pub fn get_mut(&mut self, axis: usize) -> Option<&mut SimHome> {
+        self.0.get_mut(axis)?.as_mut()
+    }
+
+    /// Advances all by a tick, to where `position_mm` says that an axis is; where it does not, nothing changes.
+    pub fn advance(&mut self, position_mm: impl Fn(usize) -> Option<f64>, counts: [Counts; AXES]) {
+        for ((axis, home), counts) in self.0.iter_mut().enumerate().zip(counts) {
+            if let Some(home) = home
+                && let Some(position_mm) = position_mm(axis)
+            {
+                home.advance(position_mm, counts);
+            }
+        }
+    }
+
+    /// The inputs, with the switches of those axes that have one.
+    #[must_use]
+    pub fn with_switches(&self, mut inputs: MachineInputs<AXES>) -> MachineInputs<AXES> {
+        for (axis, home) in inputs.axes.iter_mut().zip(&self.0) {
+            if let Some(home) = home {
+                *axis = axis.with_home(home.is_closed());
+            }
+        }
+        inputs
+    }
+}
+
+/// Of an axis without one nothing is latched.
+impl<const AXES: usize> IndexLatch for SimHomes<AXES> {
+    type Error = Infallible;
+
+    fn arm(&mut self, axis: usize) -> Result<(), Infallible> {
+        if let Some(home) = self.get_mut(axis) {
+            home.arm();
+        }
+        Ok(())
+    }
+
+    fn latched(&mut self, axis: usize) -> Result<Option<Counts>, Infallible> {
+        Ok(self.get_mut(axis).and_then(|home| home.latched()))
     }
 }
 

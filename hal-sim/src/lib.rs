@@ -91,7 +91,7 @@ pub use dac_frame::OutputRange;
 pub use drive::{DriveModel, DriveState, SUBSTEPS_MAX};
 pub use drive_parameters::{BedMode, DriveParameters, REFERENCE_X, REFERENCE_Y, REFERENCE_Z};
 pub use encoder::{EncoderNoise, EncoderParameters, REFERENCE_ENCODER, SimEncoder, TimerBits};
-pub use home::{HomeParameters, IndexParameters, SimHome, SwitchParameters};
+pub use home::{HomeParameters, IndexParameters, SimHome, SimHomes, SwitchParameters};
 pub use injection::{Injection, Injector};
 pub use machine::{
     AxisTruth, MachineError, MachineParameters, REFERENCE_LINE, REFERENCE_SUBSTEPS, REFERENCE_TICK_S,

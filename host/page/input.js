@@ -8,27 +8,32 @@ import { wheelFactor } from "page/span.js";
 const SCROLL_GOES_ON_MS = 350;
 let scrolledAt = -Infinity;
 
+/** The place of an event, from an element's upper left corner [px]. */
+export function placeIn(element, event) {
+  const box = element.getBoundingClientRect();
+  return [event.clientX - box.left, event.clientY - box.top];
+}
+
+/** The middle of all fingers, a map to their places, and how far apart the first two are. */
+export function grip(fingers) {
+  const places = [...fingers.values()];
+  const mean = (way) => places.reduce((sum, place) => sum + place[way], 0) / places.length;
+  const spread = places.length > 1 ? Math.hypot(places[0][0] - places[1][0], places[0][1] - places[1][1]) : 0;
+  return { x: mean(0), y: mean(1), spread };
+}
+
 /** Listens on an element. `drawing` is told places in pixels from the element's upper left corner: `point(x, y, isSet)`, `leave()`,
  * `pan(dx, dy)`, `zoom(x, y, factor)`, above 1 to see more, `showAll()`, and whether it shows all already, `isWhole()`. */
 export function listen(element, drawing) {
   const fingers = new Map();
   let drag = null;
-  const at = (event) => {
-    const box = element.getBoundingClientRect();
-    return [event.clientX - box.left, event.clientY - box.top];
-  };
-  const grip = () => {
-    const places = [...fingers.values()];
-    const mean = (way) => places.reduce((sum, place) => sum + place[way], 0) / places.length;
-    const spread = places.length > 1 ? Math.hypot(places[0][0] - places[1][0], places[0][1] - places[1][1]) : 0;
-    return { x: mean(0), y: mean(1), spread };
-  };
+  const at = (event) => placeIn(element, event);
   element.addEventListener("pointerdown", (event) => {
     if (event.button > 1) return;
     element.setPointerCapture(event.pointerId);
     fingers.set(event.pointerId, at(event));
     const moves = fingers.size > 1 || event.shiftKey || event.button === 1;
-    drag = { moves, ...grip() };
+    drag = { moves, ...grip(fingers) };
     if (moves) event.preventDefault();
     else drawing.point(...at(event), true);
     element.closest("[tabindex]")?.focus({ preventScroll: true });
@@ -36,7 +41,7 @@ export function listen(element, drawing) {
   element.addEventListener("pointermove", (event) => {
     if (fingers.has(event.pointerId)) fingers.set(event.pointerId, at(event));
     if (drag?.moves) {
-      const now = grip();
+      const now = grip(fingers);
       drawing.pan(now.x - drag.x, now.y - drag.y);
       if (drag.spread && now.spread) drawing.zoom(now.x, now.y, drag.spread / Math.max(10, now.spread));
       drag = { moves: true, ...now };
@@ -48,7 +53,7 @@ export function listen(element, drawing) {
   });
   const end = (event) => {
     fingers.delete(event.pointerId);
-    drag = fingers.size ? { moves: true, ...grip() } : null;
+    drag = fingers.size ? { moves: true, ...grip(fingers) } : null;
   };
   element.addEventListener("pointerup", end);
   element.addEventListener("pointercancel", end);

@@ -1,5 +1,7 @@
 // What pointers, wheel and keys do to the picture of the path: turn it, move it, zoom it, and point at a place of the run.
 
+import { grip, placeIn } from "page/input.js";
+
 /** How far a pointer moves at most to have pointed [px]. */
 const STILL_PX = 3;
 /** Pixels of a turn by a radian. */
@@ -14,22 +16,13 @@ export function listen(path) {
   const { stage, state, camera } = path;
   const fingers = new Map();
   let drag = null;
-  const at = (event) => {
-    const box = stage.getBoundingClientRect();
-    return [event.clientX - box.left, event.clientY - box.top];
-  };
-  const centre = () => {
-    const all = [...fingers.values()];
-    const mean = (way) => all.reduce((sum, place) => sum + place[way], 0) / all.length;
-    const spread = all.length > 1 ? Math.hypot(all[0][0] - all[1][0], all[0][1] - all[1][1]) : 0;
-    return { x: mean(0), y: mean(1), spread };
-  };
+  const at = (event) => placeIn(stage, event);
 
   stage.addEventListener("pointerdown", (event) => {
     stage.setPointerCapture(event.pointerId);
     fingers.set(event.pointerId, at(event));
     const turns = camera.isInSpace && fingers.size === 1 && event.button === 0 && !event.shiftKey;
-    drag = { ...centre(), turns, far: 0 };
+    drag = { ...grip(fingers), turns, far: 0 };
   });
   stage.addEventListener("pointermove", (event) => {
     if (!drag) {
@@ -40,7 +33,7 @@ export function listen(path) {
     }
     if (!fingers.has(event.pointerId)) return;
     fingers.set(event.pointerId, at(event));
-    const now = centre();
+    const now = grip(fingers);
     const [dx, dy] = [now.x - drag.x, now.y - drag.y];
     const far = drag.far + Math.abs(dx) + Math.abs(dy);
     if (far <= STILL_PX) {
@@ -63,7 +56,7 @@ export function listen(path) {
       if (tick !== undefined) state.visit(tick);
     }
     fingers.delete(event.pointerId);
-    drag = fingers.size ? { ...centre(), turns: false, far: Infinity } : null;
+    drag = fingers.size ? { ...grip(fingers), turns: false, far: Infinity } : null;
   };
   stage.addEventListener("pointerup", end);
   stage.addEventListener("pointercancel", end);

@@ -3,17 +3,7 @@
 // Ticks are counted from the run's first one. A quantity is known sample by sample, of `ticksPerSample` ticks each.
 
 import { Pyramid } from "page/pyramid.js";
-
-/** The last index whose value is not above `wanted`, or −1. */
-function lastNotAbove(values, wanted) {
-  let [from, to] = [0, values.length];
-  while (from < to) {
-    const middle = (from + to) >> 1;
-    if (values[middle] <= wanted) from = middle + 1;
-    else to = middle;
-  }
-  return from - 1;
-}
+import { lastNotAbove } from "page/sorted.js";
 
 /** A quantity over time. */
 class Quantity {

@@ -5,6 +5,7 @@ import { make } from "page/dom.js";
 import { Figure } from "page/figure.js";
 import { reading } from "page/format.js";
 import { listen } from "page/input.js";
+import { lastNotAbove } from "page/sorted.js";
 import { Span } from "page/span.js";
 import { dashes, ink, keyOf } from "page/theme.js";
 
@@ -12,17 +13,6 @@ import { dashes, ink, keyOf } from "page/theme.js";
 const LEAST = 1e-6;
 /** Radius of a dot [px]. */
 const DOT = 3;
-
-/** The last of sorted values that is not above `wanted`, or −1. */
-function lastNotAbove(values, wanted) {
-  let [from, to] = [0, values.length];
-  while (from < to) {
-    const middle = (from + to) >> 1;
-    if (values[middle] <= wanted) from = middle + 1;
-    else to = middle;
-  }
-  return from - 1;
-}
 
 /** A curve's points in the order of their places; those without a value are left out. */
 class Curve {

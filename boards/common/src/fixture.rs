@@ -2,7 +2,7 @@
 
 use core::convert::Infallible;
 
-use hal_sim::SimHome;
+use hal_sim::SimHomes;
 use motion_kernel::hal::{
     BoardOutputs, DriveEnable, Encoder, IndexLatch, Inputs, MachineInputs, OutputState, Outputs,
     VelocityChannel,
@@ -63,7 +63,7 @@ pub(crate) struct IdealDrives {
     counts_per_code: [f64; AXES],
     mm_per_count: [f64; AXES],
     /// Home switches and index latches; the first axis has no latch.
-    pub(crate) homes: [Option<SimHome>; AXES],
+    pub(crate) homes: SimHomes<AXES>,
     pub(crate) is_enabled: bool,
     pub(crate) now: u32,
     /// Ticks in which outputs were switched.
@@ -80,11 +80,8 @@ impl Encoder<AXES> for IdealDrives {
     type Error = Infallible;
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
         let counts = self.counts.map(|counts| Counts(counts.round() as i64));
-        for ((home, mm_per_count), counts) in self.homes.iter_mut().zip(self.mm_per_count).zip(counts) {
-            if let Some(home) = home {
-                home.advance(counts.0 as f64 * mm_per_count, counts);
-            }
-        }
+        let position_mm = |axis: usize| Some(counts[axis].0 as f64 * self.mm_per_count[axis]);
+        self.homes.advance(position_mm, counts);
         Ok(counts)
     }
 }
@@ -96,23 +93,19 @@ pub(crate) struct NoIndex;
 impl IndexLatch for IdealDrives {
     type Error = NoIndex;
     fn arm(&mut self, axis: usize) -> Result<(), NoIndex> {
-        let home = self.homes.get_mut(axis).and_then(Option::as_mut).filter(|_| axis != 0).ok_or(NoIndex)?;
-        home.arm();
+        self.homes.get_mut(axis).filter(|_| axis != 0).ok_or(NoIndex)?.arm();
         Ok(())
     }
     fn latched(&mut self, axis: usize) -> Result<Option<Counts>, NoIndex> {
-        Ok(self.homes.get(axis).and_then(|home| home.as_ref()?.latched()))
+        let Ok(latched) = self.homes.latched(axis);
+        Ok(latched)
     }
 }
 
 impl Inputs<AXES> for IdealDrives {
     type Error = Infallible;
     fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
-        let mut inputs = MachineInputs::HEALTHY;
-        for (axis, home) in inputs.axes.iter_mut().zip(&self.homes) {
-            *axis = axis.with_home(home.as_ref().is_some_and(SimHome::is_closed));
-        }
-        Ok(inputs)
+        Ok(self.homes.with_switches(MachineInputs::HEALTHY))
     }
 }
 
@@ -148,7 +141,7 @@ impl IdealDrives {
             counts: [0.0; AXES],
             counts_per_code,
             mm_per_count: machine().header().axes.map(|axis| axis.mm_per_count),
-            homes: [const { None }; AXES],
+            homes: SimHomes::NONE,
             is_enabled: false,
             now: 0,
             switched: Vec::new(),

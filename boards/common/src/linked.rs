@@ -206,13 +206,8 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
             // At a program stop, or in a dwell, there is nothing to come to rest from.
             let is_aborted = !homes && (live == State::Aborted || live == State::Aborting && is_waiting);
             let tick = control.kernel.trace().tick;
-            let mut note = |command: Command| {
-                if let Some(log) = streamed.log_mut() {
-                    log.command(tick, command);
-                }
-            };
             if requests.clears_fault {
-                note(Command::ClearFault);
+                note(streamed, tick, Command::ClearFault);
                 if let Some(Fault { kind, .. }) = control.kernel.fault() {
                     forget_lost(&kind, homing);
                 }
@@ -222,22 +217,24 @@ impl<'a, R: Real, const AXES: usize, const ITEMS: usize, const PLACES: usize, co
             }
             let here = match requests.power {
                 Some(false) => {
-                    note(Command::StandHere);
+                    note(streamed, tick, Command::StandHere);
                     Some(control.kernel.stand_here())
                 }
                 Some(true) if may_enable && control.may_enable() => {
                     let settle_ticks = board.settle_ticks();
-                    note(Command::StandHere);
-                    note(Command::Enable { settle_ticks });
+                    note(streamed, tick, Command::StandHere);
+                    note(streamed, tick, Command::Enable { settle_ticks });
                     let here = control.kernel.stand_here();
                     control.kernel.enable(settle_ticks);
                     Some(here)
                 }
-                _ if is_aborted => control.kernel.rest_here().inspect(|_| note(Command::RestHere)),
+                _ if is_aborted => {
+                    control.kernel.rest_here().inspect(|_| note(streamed, tick, Command::RestHere))
+                }
                 _ => None,
             };
             if requests.resumes {
-                note(Command::Resume);
+                note(streamed, tick, Command::Resume);
                 control.kernel.resume();
             }
             if let Some(here) = here {
@@ -589,7 +586,7 @@ fn machine_state(is_off: bool, live: State, tick: ExecState) -> MachineState {
 
 #[cfg(test)]
 mod tests {
-    use hal_sim::{HomeParameters, IndexParameters, SimHome, SwitchParameters};
+    use hal_sim::{HomeParameters, IndexParameters, SimHome, SimHomes, SwitchParameters};
     use motion_kernel::fault::FaultKind;
     use motion_kernel::flight::{FlightRecorder, FlightRow};
     use motion_kernel::hal::Spindle;
@@ -687,7 +684,7 @@ mod tests {
         let mut linked = Linked::<f32, AXES, ITEMS, 64, 0>::new(&BOARD, link, feeder, header.pulse);
         linked.set_homing(&figures(), header.pulse);
         let mut drives = IdealDrives::new();
-        drives.homes = homes;
+        drives.homes = SimHomes::new(homes);
         let mut operator = Operator {
             host: Host::new(1),
             status: None,

@@ -6,16 +6,10 @@
 //! that is too low, it waits forever, with everything off.
 
 use defmt::info;
-#[cfg(feature = "link")]
-use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use motion_kernel::hal::Ad5754Output;
-#[cfg(feature = "link")]
-use nucleo_f446re::design_parameters::PARAMETER_SECTORS;
 use nucleo_f446re::design_parameters::{
     APB1_HZ, APB1_TIMER_HZ, APB2_HZ, APB2_TIMER_HZ, HSE_HZ, SPI_HZ, SYSCLK_HZ, WATCHDOG_MS,
 };
-#[cfg(feature = "link")]
-use stm32f4xx_hal::flash::UnlockedFlash;
 use stm32f4xx_hal::gpio::{Alternate, AnyPin, Input, Output, PA3, PA10, PB12, PC13, Pull, Speed};
 use stm32f4xx_hal::pac::rcc::csr;
 use stm32f4xx_hal::pac::{self, SPI2};
@@ -74,70 +68,6 @@ pub(crate) struct Board {
     pub(crate) line: Line,
 }
 
-/// Where the code begins, as the linker has it.
-#[cfg(feature = "link")]
-const CODE_BEGIN: u32 = match u32::from_str_radix(env!("MOTION_CODE_BEGIN"), 10) {
-    Ok(begin) => begin,
-    Err(_) => panic!("a number"),
-};
-#[cfg(feature = "link")]
-const _: () = assert!(
-    PARAMETER_SECTORS.end == CODE_BEGIN && PARAMETER_SECTORS.end <= 0x1_0000,
-    "parameters are before the code, in sectors of 16 KiB"
-);
-
-/// The processor's flash where its sectors are small, for which the HAL has the size of the largest.
-#[cfg(feature = "link")]
-struct SmallSectors<'a>(UnlockedFlash<'a>);
-
-#[cfg(feature = "link")]
-impl ErrorType for SmallSectors<'_> {
-    type Error = stm32f4xx_hal::flash::Error;
-}
-
-#[cfg(feature = "link")]
-impl ReadNorFlash for SmallSectors<'_> {
-    const READ_SIZE: usize = UnlockedFlash::READ_SIZE;
-
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
-        self.0.read(offset, bytes)
-    }
-
-    fn capacity(&self) -> usize {
-        self.0.capacity()
-    }
-}
-
-#[cfg(feature = "link")]
-impl NorFlash for SmallSectors<'_> {
-    const WRITE_SIZE: usize = UnlockedFlash::WRITE_SIZE;
-    const ERASE_SIZE: usize = 16 * 1024;
-
-    /// Sector by sector, each of its own size.
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
-        NorFlash::erase(&mut self.0, from, to)
-    }
-
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
-        self.0.write(offset, bytes)
-    }
-}
-
-/// The parameters; new ones are written to flash, which takes 0.8 s at most (DS10693, flash memory characteristics: erase of
-/// 16 KiB, byte by byte).
-#[cfg(feature = "link")]
-fn stored_parameters(mut flash: pac::FLASH) -> &'static [u8] {
-    use stm32f4xx_hal::flash::FlashExt;
-
-    // The data cache does not see an erase: it is off meanwhile, and empty afterwards (RM0390, section 3.4.2).
-    flash.acr().modify(|_, w| w.dcen().clear_bit());
-    let parameters = crate::stored::parameters(SmallSectors(flash.unlocked()));
-    flash.acr().modify(|_, w| w.dcrst().set_bit());
-    flash.acr().modify(|_, w| w.dcrst().clear_bit());
-    flash.acr().modify(|_, w| w.dcen().set_bit());
-    parameters
-}
-
 impl Board {
     /// Sets the board up. Takes a few milliseconds, or what new parameters take; the tick's timer and the watchdog do not run yet.
     pub(crate) fn new(device: pac::Peripherals, mut core: cortex_m::Peripherals) -> Self {
@@ -177,7 +107,7 @@ impl Board {
         let lines = device.EXTI;
         supply::watch(&device.FLASH, &device.PWR, &lines, &mut rcc);
         #[cfg(feature = "link")]
-        let parameters = stored_parameters(device.FLASH);
+        let parameters = crate::flash::parameters(device.FLASH);
         #[cfg(not(feature = "link"))]
         let parameters = nucleo_f446re::machine::PROGRAM;
 

@@ -28,6 +28,8 @@ mod emergency_stop;
 #[cfg(not(feature = "emulated"))]
 mod encoders;
 #[cfg(all(feature = "link", not(feature = "emulated")))]
+mod flash;
+#[cfg(all(feature = "link", not(feature = "emulated")))]
 mod link_port;
 #[cfg(not(feature = "emulated"))]
 mod supply;

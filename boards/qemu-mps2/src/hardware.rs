@@ -5,7 +5,7 @@
 use core::convert::Infallible;
 
 use hal_sim::{
-    Ad5754Chip, ChipError, HomeParameters, IndexParameters, REFERENCE_LINE, SimHome, SimMachine,
+    Ad5754Chip, ChipError, HomeParameters, IndexParameters, REFERENCE_LINE, SimHome, SimHomes, SimMachine,
     SwitchParameters,
 };
 use motion_kernel::hal::{
@@ -26,7 +26,7 @@ pub type Simulated = SimMachine<AXES, REFERENCE_LINE>;
 pub struct Hardware {
     machine: &'static Simulated,
     outputs: Ad5754Output<&'static Ad5754Chip, AXES>,
-    homes: [Option<SimHome>; AXES],
+    homes: SimHomes<AXES>,
     /// Spindle and coolant as they were switched last.
     pub switched: OutputState,
 }
@@ -38,18 +38,16 @@ impl Hardware {
     /// The converter does not take its configuration.
     pub fn new(machine: &'static Simulated) -> Result<Self, Ad5754Error<ChipError>> {
         let outputs = Ad5754Output::setup(machine.chip(), &mut machine.chip())?;
-        Ok(Self { machine, outputs, homes: [const { None }; AXES], switched: OutputState::OFF })
+        Ok(Self { machine, outputs, homes: SimHomes::NONE, switched: OutputState::OFF })
     }
 
     /// Gives every axis that is homed a switch, and an index where it looks for one: the switch is closed from a third of the
     /// search's length on, an index follows after half of the length within which it is looked for.
     pub fn add_homes(&mut self, header: &Header<AXES>, homing: &HomingFigures<AXES>, counts: [Counts; AXES]) {
-        let machine = self.machine;
-        for ((((number, home), axis), figures), counts) in
-            self.homes.iter_mut().enumerate().zip(&header.axes).zip(&homing.axes).zip(counts)
-        {
-            let Some(position_mm) = machine.position_mm(number) else { continue };
-            let Some(config) = figures.as_ref().map(|figures| &figures.config) else { continue };
+        self.homes = SimHomes::new(core::array::from_fn(|number| {
+            let (axis, counts) = (header.axes.get(number)?, counts.get(number)?);
+            let position_mm = self.machine.position_mm(number)?;
+            let config = &homing.axes.get(number)?.as_ref()?.config;
             let sign = if config.direction == Direction::Positive { 1.0 } else { -1.0 };
             let near_mm = position_mm + sign * config.travel_mm / 3.0;
             let far_mm = near_mm + sign * config.back_off_mm;
@@ -60,8 +58,8 @@ impl Hardware {
             });
             let closes_mm = if sign > 0.0 { (near_mm, far_mm) } else { (far_mm, near_mm) };
             let switch = Some(SwitchParameters { closes_mm, hysteresis_mm: 0.2 });
-            *home = Some(SimHome::new(HomeParameters { switch, index }, position_mm, counts));
-        }
+            Some(SimHome::new(HomeParameters { switch, index }, position_mm, *counts))
+        }));
     }
 
     /// Lets the machine move for a tick.
@@ -75,13 +73,7 @@ impl Encoder<AXES> for Hardware {
 
     fn latch(&mut self) -> Result<[Counts; AXES], Infallible> {
         let Ok(counts) = self.machine.latch();
-        for ((number, home), counts) in self.homes.iter_mut().enumerate().zip(counts) {
-            if let Some(home) = home
-                && let Some(position_mm) = self.machine.position_mm(number)
-            {
-                home.advance(position_mm, counts);
-            }
-        }
+        self.homes.advance(|axis| self.machine.position_mm(axis), counts);
         Ok(counts)
     }
 }
@@ -90,13 +82,8 @@ impl Inputs<AXES> for Hardware {
     type Error = Infallible;
 
     fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
-        let Ok(mut inputs) = self.machine.read_inputs();
-        for (axis, home) in inputs.axes.iter_mut().zip(&self.homes) {
-            if let Some(home) = home {
-                *axis = axis.with_home(home.is_closed());
-            }
-        }
-        Ok(inputs)
+        let Ok(inputs) = self.machine.read_inputs();
+        Ok(self.homes.with_switches(inputs))
     }
 }
 
@@ -104,14 +91,11 @@ impl IndexLatch for Hardware {
     type Error = Infallible;
 
     fn arm(&mut self, axis: usize) -> Result<(), Infallible> {
-        if let Some(Some(home)) = self.homes.get_mut(axis) {
-            home.arm();
-        }
-        Ok(())
+        self.homes.arm(axis)
     }
 
     fn latched(&mut self, axis: usize) -> Result<Option<Counts>, Infallible> {
-        Ok(self.homes.get(axis).and_then(|home| home.as_ref()?.latched()))
+        self.homes.latched(axis)
     }
 }
 

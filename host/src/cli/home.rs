@@ -11,13 +11,12 @@ use serde::Serialize;
 
 use super::error::{CliError, Outcome};
 use super::outputs::Outputs;
-use super::port::{OnBoard, OptionalPort, PortArguments, dead_man_ms};
+use super::port::{OnBoard, OptionalBoard, PortArguments};
 use super::table::{self, Align};
 use super::trace::TraceArguments;
 use super::units::{InUnit, TableUnits};
 use super::{input, write_json};
 use crate::board::home::{OnBoardHoming, mask};
-use crate::board::sender::{Found, Permissions};
 use crate::board::{Connection, Job};
 use crate::files::{Files, interrupt};
 use crate::machine::{Machine, on_machine};
@@ -54,16 +53,7 @@ pub struct HomeArguments {
     #[arg(long = "axis", value_name = "AXIS")]
     axes: Vec<String>,
     #[command(flatten)]
-    port: OptionalPort,
-    /// On a board: after so long a silence of this command it comes to rest, s; 0.15 to 60.
-    #[arg(long, value_name = "S", default_value_t = 0.25, requires = "port")]
-    dead_man: f64,
-    /// On a board: switch the drives on if they are off.
-    #[arg(long, requires = "port")]
-    enable: bool,
-    /// On a board: give up what it has of a program.
-    #[arg(long, requires = "port")]
-    restart: bool,
+    board: OptionalBoard,
     #[command(flatten)]
     trace: TraceArguments,
     /// Print JSON.
@@ -103,7 +93,7 @@ fn home<const N: usize>(
     let name = arguments.machine.display().to_string();
     let refused = |source: HomeError| CliError::Home { machine: name.clone(), source };
     let homes = Homes::new(machine, &arguments.axes).map_err(refused)?;
-    if let Some(port) = arguments.port.given() {
+    if let Some(port) = arguments.board.given() {
         if arguments.trace.trace.is_some() {
             let found = "--trace with --port".to_owned();
             return Err(CliError::Arguments {
@@ -111,7 +101,7 @@ fn home<const N: usize>(
                 expected: "one of them: `motion watch --scope` traces a board",
             });
         }
-        let dead_man_ms = dead_man_ms(arguments.dead_man)?;
+        let dead_man_ms = arguments.board.dead_man_ms()?;
         let (port, is_json) = (&port, arguments.json);
         return port.on_board(machine, OnHoming { machine, arguments, port, dead_man_ms, is_json, out });
     }
@@ -141,8 +131,7 @@ impl<const N: usize> OnBoard for OnHoming<'_, N> {
         let Self { machine, arguments, port, dead_man_ms, is_json, out } = self;
         let axes = mask(machine, &arguments.axes).map_err(|error| port.refused(error))?;
         let job = Arc::new(Job::<M>::new(machine, &[]));
-        let found = if arguments.restart { Found::GivenUp } else { Found::Stays };
-        let may = Permissions { enables: arguments.enable, found, ..Permissions::default() };
+        let may = arguments.board.permissions();
         let homing = OnBoardHoming { machine, job, may, dead_man_ms };
         let mut homed = Vec::new();
         interrupt::hold_first();

@@ -10,13 +10,12 @@ use serde::Serialize;
 
 use super::error::{CliError, Outcome};
 use super::outputs::Outputs;
-use super::port::{OnBoard, OptionalPort, PortArguments, dead_man_ms};
+use super::port::{OnBoard, OptionalBoard, PortArguments};
 use super::table::{self, Align};
 use super::trace::TraceArguments;
 use super::units::{InUnit, TableUnits, feed_per_s};
 use super::{input, write_json};
 use crate::board::jog::Jogs;
-use crate::board::sender::{Found, Permissions};
 use crate::board::{Connection, Job};
 use crate::files::{Files, interrupt};
 use crate::machine::{Machine, on_machine};
@@ -58,16 +57,7 @@ pub struct JogArguments {
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
     #[command(flatten)]
-    port: OptionalPort,
-    /// On a board: after so long a silence of this command it holds, s; 0.15 to 60.
-    #[arg(long, value_name = "S", default_value_t = 0.25, requires = "port")]
-    dead_man: f64,
-    /// On a board: switch the drives on if they are off.
-    #[arg(long, requires = "port")]
-    enable: bool,
-    /// On a board: give up what it has of a program.
-    #[arg(long, requires = "port")]
-    restart: bool,
+    board: OptionalBoard,
     #[command(flatten)]
     trace: TraceArguments,
     /// Print JSON.
@@ -128,7 +118,7 @@ fn jog<const N: usize>(
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
     let keys = Keys::new(machine, &arguments.presses, arguments.feed)?;
-    if let Some(port) = arguments.port.given() {
+    if let Some(port) = arguments.board.given() {
         if arguments.trace.trace.is_some() {
             let found = "--trace with --port".to_owned();
             return Err(CliError::Arguments {
@@ -155,7 +145,7 @@ fn jog_on_board<const N: usize>(
     (port, keys): (&PortArguments, &Keys<'_, N>),
     out: &mut dyn Write,
 ) -> Result<Outcome, CliError> {
-    let dead_man_ms = dead_man_ms(arguments.dead_man)?;
+    let dead_man_ms = arguments.board.dead_man_ms()?;
     port.on_board(machine, OnKeys { machine, arguments, port, keys, dead_man_ms, out })
 }
 
@@ -175,8 +165,7 @@ impl<const N: usize> OnBoard for OnKeys<'_, N> {
         let Self { machine, arguments, port, keys, dead_man_ms, out } = self;
         let job = Arc::new(Job::<M>::new(machine, &[]));
         let axes = machine.axis_names();
-        let found = if arguments.restart { Found::GivenUp } else { Found::Stays };
-        let may = Permissions { enables: arguments.enable, found, ..Permissions::default() };
+        let may = arguments.board.permissions();
         let jogs = Jogs { keys, job, axes, may, dead_man_ms };
         let (mut jogged, mut is_released, mut ended) = (Vec::new(), false, Ok(()));
         interrupt::hold_first();

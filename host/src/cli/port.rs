@@ -56,6 +56,46 @@ pub(super) struct OptionalPort {
     baud: u32,
 }
 
+/// What a move that a PC has to ask for all the time may do with a board, for commands that do without one, too.
+#[derive(Debug, Args)]
+pub(super) struct OptionalBoard {
+    #[command(flatten)]
+    port: OptionalPort,
+    /// On a board: after so long a silence of this command it comes to rest, s; 0.15 to 60.
+    #[arg(long, value_name = "S", default_value_t = 0.25, requires = "port")]
+    dead_man: f64,
+    /// On a board: switch the drives on if they are off.
+    #[arg(long, requires = "port")]
+    enable: bool,
+    /// On a board: give up what it has of a program.
+    #[arg(long, requires = "port")]
+    restart: bool,
+}
+
+impl OptionalBoard {
+    /// The port, if one is asked for.
+    pub(super) fn given(&self) -> Option<PortArguments> {
+        self.port.given()
+    }
+
+    /// The time of the dead man \[ms\].
+    pub(super) fn dead_man_ms(&self) -> Result<u16, CliError> {
+        let dead_man_s = self.dead_man;
+        // A PC that has nothing else to say says something ten times a second.
+        if (0.15..=60.0).contains(&dead_man_s) {
+            return Ok((dead_man_s * 1e3).round() as u16);
+        }
+        let found = format!("--dead-man {dead_man_s}");
+        Err(CliError::Arguments { found, expected: "from 0.15 to 60 s" })
+    }
+
+    /// What a sender may do.
+    pub(super) fn permissions(&self) -> Permissions {
+        let found = if self.restart { Found::GivenUp } else { Found::Stays };
+        Permissions { enables: self.enable, found, ..Permissions::default() }
+    }
+}
+
 impl OptionalPort {
     /// The port, if one is asked for.
     pub(super) fn given(&self) -> Option<PortArguments> {
@@ -118,16 +158,6 @@ impl PortArguments {
         let open = Box::new(move || port.open(baud));
         Connection::open(open, unique()).map_err(|error| self.refused(error.into()))
     }
-}
-
-/// The time of a dead man \[ms\], from seconds.
-pub(super) fn dead_man_ms(dead_man_s: f64) -> Result<u16, CliError> {
-    // A PC that has nothing else to say says something ten times a second.
-    if (0.15..=60.0).contains(&dead_man_s) {
-        return Ok((dead_man_s * 1e3).round() as u16);
-    }
-    let found = format!("--dead-man {dead_man_s}");
-    Err(CliError::Arguments { found, expected: "from 0.15 to 60 s" })
 }
 
 /// What a command does with a board that has answered.

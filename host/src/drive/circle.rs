@@ -39,6 +39,22 @@ impl CircleFigures {
         self.contour_um_max.abs().max(self.contour_um_min.abs())
     }
 
+    /// The errors of this circle and those of `other`, in turns \[µm\]: contour error, form deviation, following error of the
+    /// first and of the second axis.
+    #[must_use]
+    pub fn errors_um_beside(&self, other: &Self) -> [f64; 8] {
+        [
+            self.contour_um(),
+            other.contour_um(),
+            self.form_um(),
+            other.form_um(),
+            self.following_um[0],
+            other.following_um[0],
+            self.following_um[1],
+            other.following_um[1],
+        ]
+    }
+
     /// Form deviation: greatest less least radius \[µm\].
     #[must_use]
     pub fn form_um(&self) -> f64 {

@@ -499,12 +499,11 @@ fn compare(bench: &mut Bench, index: usize, plane: Plane, frequency_hz: f64) -> 
             bench.compared += 1;
             bench.shown.extend([around.clone(), around_after]);
             let is_worse = !verdict.is_no_worse(before, &after);
-            let of = |circle: &CircleFigures| (circle.contour_um(), circle.form_um());
-            let ((contour, form), (contour_after, form_after)) = (of(before), of(&after));
-            let figures =
-                [before.feed_mm_s * 60.0, contour, contour_after, form, form_after].map(Cell::Number);
+            // Contour and form.
+            let errors = before.errors_um_beside(&after).into_iter().take(4);
+            let figures = [before.feed_mm_s * 60.0].into_iter().chain(errors).map(Cell::Number);
             let verdict = words(if is_worse { "worse" } else { "no worse" });
-            (figures.into_iter().chain([verdict]).collect::<Vec<_>>(), is_worse)
+            (figures.chain([verdict]).collect::<Vec<_>>(), is_worse)
         }
         // What the machine could drive before, it is to drive now.
         (before, after) => {

@@ -6,7 +6,7 @@
 
 use core::convert::Infallible;
 
-use hal_sim::{CHANNELS, ChipError, Injection, Injector, SimHome, SimMachine};
+use hal_sim::{CHANNELS, ChipError, Injection, Injector, SimHome, SimHomes, SimMachine};
 use motion_kernel::hal::{
     Ad5754Error, DriveEnable, Encoder, IndexLatch, Inputs, MachineInputs, OutputState, Outputs,
     VelocityChannel,
@@ -52,7 +52,7 @@ pub struct SimulatedHardware<'a, const N: usize = 3> {
     /// What will break.
     pub(super) breaks: Vec<Break>,
     /// What axes that can be homed have for it.
-    homes: [Option<SimHome>; N],
+    homes: SimHomes<N>,
     /// Ticks so far.
     ticks: u64,
 }
@@ -65,18 +65,18 @@ impl<'a, const N: usize> SimulatedHardware<'a, N> {
     pub fn new(machine: &'a Simulated<N>) -> Result<Self, RunError> {
         let outputs = Converters::setup(machine.chips(), N)
             .map_err(|error| RunError::Simulation(format!("{error:?}")))?;
-        let homes = [const { None }; N];
-        Ok(Self { machine, outputs, injector: Injector::new(), breaks: Vec::new(), homes, ticks: 0 })
+        let (injector, homes) = (Injector::new(), SimHomes::NONE);
+        Ok(Self { machine, outputs, injector, breaks: Vec::new(), homes, ticks: 0 })
     }
 
     /// Adds home switches and index latches of the axes that have settings for them, where encoders read
     /// `counts`.
     pub fn add_homes(&mut self, machine: &Machine<N>, counts: [Counts; N]) {
         let truth = self.machine.truth();
-        self.homes = core::array::from_fn(|axis| {
+        self.homes = SimHomes::new(core::array::from_fn(|axis| {
             let homing = machine.axes[axis].homing.as_ref()?;
             Some(SimHome::new(homing.simulated, truth[axis].position_mm, counts[axis]))
-        });
+        }));
     }
 
     /// Breaks something of an axis, from 0.
@@ -118,11 +118,7 @@ impl<const N: usize> Encoder<N> for SimulatedHardware<'_, N> {
     fn latch(&mut self) -> Result<[Counts; N], Infallible> {
         let Ok(counts) = self.machine.latch();
         let counts = self.injector.counts(counts);
-        for ((home, truth), counts) in self.homes.iter_mut().zip(self.machine.truth()).zip(counts) {
-            if let Some(home) = home {
-                home.advance(truth.position_mm, counts);
-            }
-        }
+        self.homes.advance(|axis| self.machine.position_mm(axis), counts);
         Ok(counts)
     }
 }
@@ -131,13 +127,7 @@ impl<const N: usize> Inputs<N> for SimulatedHardware<'_, N> {
     type Error = Infallible;
 
     fn read_inputs(&mut self) -> Result<MachineInputs<N>, Infallible> {
-        let mut inputs = self.injector.inputs(self.machine);
-        for (axis, home) in inputs.axes.iter_mut().zip(&self.homes) {
-            if let Some(home) = home {
-                *axis = axis.with_home(home.is_closed());
-            }
-        }
-        Ok(inputs)
+        Ok(self.homes.with_switches(self.injector.inputs(self.machine)))
     }
 }
 
@@ -166,13 +156,10 @@ impl<const N: usize> IndexLatch for SimulatedHardware<'_, N> {
     type Error = Infallible;
 
     fn arm(&mut self, axis: usize) -> Result<(), Infallible> {
-        if let Some(Some(home)) = self.homes.get_mut(axis) {
-            home.arm();
-        }
-        Ok(())
+        self.homes.arm(axis)
     }
 
     fn latched(&mut self, axis: usize) -> Result<Option<Counts>, Infallible> {
-        Ok(self.homes.get(axis).and_then(|home| home.as_ref()?.latched()))
+        self.homes.latched(axis)
     }
 }

@@ -177,19 +177,10 @@ impl Verification {
             let rows: Vec<[String; 10]> = plane
                 .pairs()
                 .map(|(before, after)| {
-                    let um = |value: f64| format!("{value:.2}");
-                    [
-                        before.frequency_hz.to_string(),
-                        format!("{:.0}", before.feed_mm_s * 60.0),
-                        um(before.contour_um()),
-                        um(after.contour_um()),
-                        um(before.form_um()),
-                        um(after.form_um()),
-                        um(before.following_um[0]),
-                        um(after.following_um[0]),
-                        um(before.following_um[1]),
-                        um(after.following_um[1]),
-                    ]
+                    let [a, b, c, d, e, f, g, h] =
+                        before.errors_um_beside(after).map(|um| format!("{um:.2}"));
+                    let feed = format!("{:.0}", before.feed_mm_s * 60.0);
+                    [before.frequency_hz.to_string(), feed, a, b, c, d, e, f, g, h]
                 })
                 .collect();
             table::write(&columns, &rows, out)?;

@@ -273,20 +273,10 @@ fn of_plane(machine: &Machine, circles: &Circles<'_>, tuning: &Tuning<'_>, findi
         "*Verdict",
     ];
     let rows = circles.pairs.iter().map(|(before, after, is_worse)| {
-        let um = |value: f64| fixed(value, 2);
-        vec![
-            figure(before.frequency_hz, 4),
-            fixed(before.feed_mm_s * 60.0, 0),
-            um(before.contour_um()),
-            um(after.contour_um()),
-            um(before.form_um()),
-            um(after.form_um()),
-            um(before.following_um[0]),
-            um(after.following_um[0]),
-            um(before.following_um[1]),
-            um(after.following_um[1]),
-            if *is_worse { "worse" } else { "no worse" }.to_owned(),
-        ]
+        let driven = [figure(before.frequency_hz, 4), fixed(before.feed_mm_s * 60.0, 0)];
+        let errors = before.errors_um_beside(after).map(|um| fixed(um, 2));
+        let verdict = if *is_worse { "worse" } else { "no worse" }.to_owned();
+        driven.into_iter().chain(errors).chain([verdict]).collect()
     });
     findings.table("Circles", &headings, rows);
     for (before, _, _) in &circles.pairs {

@@ -37,11 +37,12 @@ const STYLE: &str = include_str!("../../../page/style.css");
 type Module = (&'static str, &'static str);
 
 /// What draws figures.
-const FIGURES: [Module; 13] = [
+const FIGURES: [Module; 14] = [
     ("page/data.js", include_str!("../../../page/data.js")),
     ("page/work.js", include_str!("../../../page/work.js")),
     ("page/format.js", include_str!("../../../page/format.js")),
     ("page/theme.js", include_str!("../../../page/theme.js")),
+    ("page/sorted.js", include_str!("../../../page/sorted.js")),
     ("page/sheet.js", include_str!("../../../page/sheet.js")),
     ("page/dom.js", include_str!("../../../page/dom.js")),
     ("page/figure.js", include_str!("../../../page/figure.js")),
