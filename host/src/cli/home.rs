@@ -32,14 +32,16 @@ Examples:
   motion home --machine mine.toml --axis X --port /dev/ttyACM0 --enable
                                       on a board; Ctrl-C ends it at rest
 
-A board homes by itself, with its own switches and index inputs, and the settings of its parameters. It ends that at rest where
-nothing comes from this command for the time of --dead-man. Times are what it tells there, some fifty times a second.
+A board homes by itself, with its own switches and index inputs, and the settings of its parameters. It ends that at
+rest where nothing comes from this command for the time of --dead-man. Times are what it tells there, some fifty times
+a second.
 
 JSON: list of {axis, counts, index_counts (how far the index was beyond the switch; null: the switch is the reference),
-time_s, position_mm (where the axis stands now), true_mm (the same from where it was switched on; null on a board)}; of a rotary axis deg in
-place of mm.
+time_s, position_mm (where the axis stands now), true_mm (the same from where it was switched on; null on a board)}; of
+a rotary axis deg in place of mm.
 
-Exit status: 1 if an axis was not homed, 2 if the machine file homes none, 4 if Ctrl-C ended it; the axes before it are printed.";
+Exit status: 1 if an axis was not homed, 2 if the machine file homes none, 4 if Ctrl-C ended it; the axes before it are
+printed.";
 
 /// Home the axes that have [axis.homing] in the machine file, one after the other: search the switch, back
 /// off, approach.
