@@ -76,6 +76,12 @@ impl SimHome {
         self.is_closed
     }
 
+    /// Whether the axis has index pulses.
+    #[must_use]
+    pub const fn has_index(&self) -> bool {
+        self.parameters.index.is_some()
+    }
+
     /// Waits for the next index.
     pub fn arm(&mut self) {
         (self.is_armed, self.latched) = (true, None);

@@ -13,8 +13,8 @@
 //!          closes, at rest└──────────────────────┘
 //! ```
 //!
-//! Without an index the reference is off by up to the slow feed times the time between two polls, plus the
-//! switch's own repeatability. With an index it is the same count wherever homing starts, as long as the
+//! Without an index the reference is off by up to the slow feed times a tick, plus the switch's own
+//! repeatability. With an index it is the same count wherever homing starts, as long as the
 //! index does not lie where the switch closes: [`Homed::index_counts`] says how far beyond the switch it was
 //! found.
 //!
@@ -109,6 +109,9 @@ pub struct HomingInput<const AXES: usize> {
     pub counts: Counts,
     /// Its home switch, as read in the same tick.
     pub is_home: bool,
+    /// Its encoder's reading in the tick in which the switch last closed, where every tick looks for that; `None` where every
+    /// tick is polled.
+    pub home_counts: Option<Counts>,
     /// The count in its index latch ([`IndexLatch`](crate::hal::IndexLatch)).
     pub index: Option<Counts>,
     /// The state of the move asked for last; before the first one it is ignored.
@@ -331,11 +334,12 @@ impl Homing {
                 Ok(HomingStep::Wait)
             }
             Stage::Approach if seen.is_home => {
+                let counts = seen.home_counts.unwrap_or(seen.counts);
                 if index_mm.is_some() {
-                    self.stage = Stage::Index { edge: here, counts: seen.counts };
+                    self.stage = Stage::Index { edge: here, counts };
                     Ok(HomingStep::ArmIndex)
                 } else {
-                    Ok(self.stop(After::Reference(Homed { counts: seen.counts, index_counts: None })))
+                    Ok(self.stop(After::Reference(Homed { counts, index_counts: None })))
                 }
             }
             Stage::Approach if is_at_rest || self.distance_mm(self.from, here) > back_off_mm => {
@@ -475,6 +479,7 @@ mod tests {
                 set: [at(0.0)],
                 counts: Counts(0),
                 is_home: false,
+                home_counts: None,
                 index: None,
                 state: State::Done,
             };
@@ -493,7 +498,7 @@ mod tests {
                 Ok(HomingStep::Stop) => (self.direction, self.seen.state) = (0.0, State::Aborted),
                 _ => {}
             }
-            let HomingInput { set: [set], counts, is_home, index, state } = &mut self.seen;
+            let HomingInput { set: [set], counts, is_home, index, state, .. } = &mut self.seen;
             *set = *set + at(self.direction);
             if *state == State::Running && *set == self.end {
                 (self.direction, *state) = (0.0, State::Done);

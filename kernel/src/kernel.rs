@@ -32,7 +32,7 @@ use serde::{Deserialize, Serialize};
 use crate::axis::{AxesConfig, AxisConfig, AxisOutput, AxisState, Correction, Preview};
 use crate::exec::{ExecState, Executor};
 use crate::fault::Reaction;
-use crate::fault::{Fault, FaultKind};
+use crate::fault::{Fault, FaultKind, axis_bit};
 use crate::hal::{AxisInputs, DriveEnable, Encoder, Inputs, MachineInputs, VelocityChannel};
 use crate::num::Real;
 use crate::queue::Intake;
@@ -93,6 +93,8 @@ pub struct Kernel<R: Real, const AXES: usize> {
     config: [AxisConfig<R>; AXES],
     preview: Preview<AXES>,
     guards: Guards<AXES>,
+    /// Axes whose encoder failed since their last reference, the lowest bit is the first one's. No tick follows from it.
+    without_counts: u16,
 }
 
 impl<R: Real, const AXES: usize> Kernel<R, AXES> {
@@ -124,6 +126,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
             told: None,
             trace,
             guards: Guards::new(reactions),
+            without_counts: 0,
         }
     }
 
@@ -347,6 +350,13 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         self.trace.fault
     }
 
+    /// Whether the encoder of an axis has failed since the axis was last [referenced](Kernel::reference): its position can't be
+    /// trusted, also where another fault was there before and after all faults are cleared.
+    #[must_use]
+    pub fn has_lost_counts(&self, axis: usize) -> bool {
+        self.without_counts & axis_bit(axis) != 0
+    }
+
     /// Clears the fault, if there is one, and stands at the actual position as [`Kernel::stand_here`] does;
     /// returns that position. The drives stay disabled until [`Kernel::enable`]. `None` while the reaction to
     /// a fault is under way: only a more urgent one, [`Kernel::disable`] and [`Kernel::stand_here`] cut it
@@ -392,6 +402,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
 
     fn latch_fault_in(&mut self, tick: u64, kind: FaultKind<R>) {
         self.react(&kind);
+        self.without_counts |= kind.axes_without_counts();
         if self.trace.fault.is_none() {
             self.trace.fault = Some(Fault { tick, kind });
         }

@@ -32,6 +32,16 @@ pub struct Control<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTE
     /// Spindle or coolant may be on.
     is_switched: bool,
     index: Index,
+    home: Option<HomeSwitch>,
+}
+
+/// An axis' home switch, at which every tick looks: a poll of the background may come many ticks after it has closed.
+#[derive(Clone, Copy)]
+struct HomeSwitch {
+    axis: usize,
+    is_closed: bool,
+    /// The encoder's reading in the tick that saw it close last.
+    closed_at: Option<Counts>,
 }
 
 /// An axis' index latch, on its way between background and tick.
@@ -81,6 +91,7 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
             due: None,
             is_switched,
             index: Index::Unused,
+            home: None,
         }
     }
 
@@ -110,6 +121,15 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
         if let Some(recorder) = &mut self.recorder {
             recorder.tick(trace, noting.failures());
         }
+        if let Some(home) = &mut self.home
+            && let (Some(inputs), Some(output)) =
+                (trace.inputs.axes.get(home.axis), trace.axes.get(home.axis))
+        {
+            let was_closed = core::mem::replace(&mut home.is_closed, inputs.is_home());
+            if home.is_closed && !was_closed {
+                home.closed_at = Some(output.counts);
+            }
+        }
         if trace.fault.is_some() {
             self.due = self.is_switched.then_some(OutputState::OFF);
         }
@@ -136,9 +156,23 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
         self.index
     }
 
-    /// Nobody asks for an index any more.
-    pub(crate) fn forget_index(&mut self) {
+    /// What an axis' encoder read when its home switch closed last, since this was first asked of that axis.
+    pub(crate) fn home_counts(&mut self, axis: usize) -> Option<Counts> {
+        match self.home {
+            Some(home) if home.axis == axis => home.closed_at,
+            _ => {
+                let inputs = self.kernel.trace().inputs.axes.get(axis);
+                let is_closed = inputs.is_some_and(|axis| axis.is_home());
+                self.home = Some(HomeSwitch { axis, is_closed, closed_at: None });
+                None
+            }
+        }
+    }
+
+    /// Nobody asks for a home switch or an index any more.
+    pub(crate) fn forget_homing(&mut self) {
         self.index = Index::Unused;
+        self.home = None;
     }
 
     /// Switches spindle and coolant in the next tick, unless that finds a fault.

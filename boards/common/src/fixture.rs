@@ -62,7 +62,7 @@ pub(crate) struct IdealDrives {
     counts: [f64; AXES],
     counts_per_code: [f64; AXES],
     mm_per_count: [f64; AXES],
-    /// Home switches and index latches; the first axis has no latch.
+    /// Home switches, and a latch for each axis that has an index.
     pub(crate) homes: SimHomes<AXES>,
     pub(crate) is_enabled: bool,
     pub(crate) now: u32,
@@ -93,7 +93,7 @@ pub(crate) struct NoIndex;
 impl IndexLatch for IdealDrives {
     type Error = NoIndex;
     fn arm(&mut self, axis: usize) -> Result<(), NoIndex> {
-        self.homes.get_mut(axis).filter(|_| axis != 0).ok_or(NoIndex)?.arm();
+        self.homes.get_mut(axis).filter(|home| home.has_index()).ok_or(NoIndex)?.arm();
         Ok(())
     }
     fn latched(&mut self, axis: usize) -> Result<Option<Counts>, NoIndex> {

@@ -84,6 +84,7 @@ impl<R: Real, const N: usize> Session<'_, R, N> {
                     set: trace.executed.setpoints.map(|setpoint| setpoint.position),
                     counts: trace.axes[axis].counts,
                     is_home: trace.inputs.axes[axis].is_home(),
+                    home_counts: None,
                     index,
                     state,
                 };

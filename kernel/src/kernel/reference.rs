@@ -3,6 +3,7 @@
 
 use super::Kernel;
 use crate::exec::{ExecState, Executor};
+use crate::fault::axis_bit;
 use crate::num::Real;
 use crate::units::{Counts, Position};
 
@@ -36,6 +37,7 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         output.set = output.set + shift;
         output.actual = output.actual + shift;
         self.preview.shift(axis, shift);
+        self.without_counts &= !axis_bit(axis);
         self.rest_at(set);
         Some(set)
     }
