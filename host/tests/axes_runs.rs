@@ -293,7 +293,7 @@ fn a_rotary_axis_is_homed() {
     let mut machine = machine::<9>(SIX);
     machine.axes[3].homing = reference.axes[0].homing;
     let mut homed = Vec::new();
-    Homes::new(&machine, &[]).and_then(|homes| homes.home(&mut homed, &mut |_| {})).expect("homed");
+    Homes::new(&machine, &[]).expect("an axis").home(&mut homed, &mut |_| {}).expect("homed");
     let [axis] = &homed[..] else { panic!("{homed:?}") };
     assert_eq!((axis.name.as_str(), axis.unit, axis.position_mm), ("A", AxisUnit::Degree, 0.0));
     assert_eq!(axis.homed.counts.0, -1_858_000);

@@ -9,7 +9,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use hal_sim::{HomeParameters, IndexParameters, SwitchParameters};
-use motion_host::board::home::{OnBoardHoming, mask};
+use motion_host::board::home::OnBoardHoming;
 use motion_host::board::items::{InPlanning, Source};
 use motion_host::board::job::parameters;
 use motion_host::board::jog::Jogs;
@@ -609,7 +609,7 @@ fn a_board_homes_as_the_simulated_machine_does() {
     let mut connection = connect(cable.address, 50);
     let job = Arc::new(Job::<3>::new(&machine, &[]));
     let homing = OnBoardHoming { machine: &machine, job, may: ENABLES, dead_man_ms: 60_000 };
-    let all = mask(&machine, &[]).expect("two axes");
+    let all = Homes::new(&machine, &[]).expect("two axes").mask();
     let mut found = Vec::new();
     let given_up = homing.home(all, &mut connection, &mut found, &mut || false, &mut |_, _| {});
     assert!(!given_up.expect("homed"));

@@ -73,9 +73,12 @@ impl<F: NorFlash> ParameterStore<F> {
     /// The record that was stored last; none if there is none. `buffer` is [`OVERHEAD`] longer than the longest one.
     ///
     /// # Errors
-    /// The flash can't be read.
+    /// The flash can't be read, or the record is longer than the buffer: a firmware with a longer one has stored it.
     pub fn read<'a>(&mut self, buffer: &'a mut [u8]) -> Result<Option<&'a [u8]>, StoreError> {
         let Some(entry) = self.newest(buffer)? else { return Ok(None) };
+        if entry.length > buffer.len().saturating_sub(HEAD) {
+            return Err(StoreError::Length);
+        }
         // Others may have been read since.
         let found = self.entry(entry.sector, entry.at, buffer)?.map(|found| found.length);
         Ok(found.and_then(|length| buffer.get(HEAD..HEAD + length)))
@@ -91,7 +94,7 @@ impl<F: NorFlash> ParameterStore<F> {
         if length > buffer.len() || length > first.len() || record.is_empty() {
             return Err(StoreError::Length);
         }
-        if self.read(buffer)? == Some(record) {
+        if self.read(buffer) == Ok(Some(record)) {
             return Ok(());
         }
         let newest = self.newest(buffer)?;
@@ -141,7 +144,7 @@ impl<F: NorFlash> ParameterStore<F> {
         Ok(newest)
     }
 
-    /// The record that begins at `at`, read to `buffer`; none if there is none.
+    /// The record that begins at `at`; none if there is none. It is read to `buffer`, in pieces if it is longer.
     fn entry(&mut self, sector: usize, at: u32, buffer: &mut [u8]) -> Result<Option<Entry>, StoreError> {
         let room = self.sectors.get(sector).map_or(0, |sector| sector.end.saturating_sub(at)) as usize;
         let Some(head) = buffer.first_chunk_mut::<HEAD>().filter(|_| room >= HEAD) else { return Ok(None) };
@@ -152,10 +155,19 @@ impl<F: NorFlash> ParameterStore<F> {
         if length == 0 || length > room - HEAD {
             return Ok(None);
         }
-        let Some(record) = buffer.get_mut(HEAD..HEAD + length) else { return Ok(None) };
-        self.flash.read(at + HEAD as u32, record).map_err(|_| StoreError::Flash)?;
-        let is_whole = buffer.get(4..HEAD + length).is_some_and(|bytes| Checksum::of(bytes) == sum);
-        Ok(is_whole.then_some(Entry { sector, at, number, length }))
+        let (head, place) = buffer.split_at_mut(HEAD);
+        let mut found = Checksum::NONE;
+        found.update(head.get(4..).unwrap_or_default());
+        let mut done = 0;
+        // Bounded: a piece has a byte at least.
+        while done < length {
+            let piece = place.len().min(length - done);
+            let Some(bytes) = place.get_mut(..piece).filter(|_| piece > 0) else { return Ok(None) };
+            self.flash.read(at + (HEAD + done) as u32, bytes).map_err(|_| StoreError::Flash)?;
+            found.update(bytes);
+            done += piece;
+        }
+        Ok((found.finish() == sum).then_some(Entry { sector, at, number, length }))
     }
 
     /// Whether there is room for `length` bytes at `at`, and all of them are erased.
@@ -388,6 +400,23 @@ mod tests {
             assert_eq!(store.write(&long, &mut buffer), Err(StoreError::Length));
             assert_eq!(store.read(&mut buffer), Ok(Some(&next[..])), "seed {seed}");
         }
+    }
+
+    /// A record that a firmware with a longer buffer has stored does not uncover the one before it, and is replaced.
+    #[test]
+    fn a_longer_record_is_told_and_replaced() {
+        let random = Dice::new(5);
+        let (mut bytes, mut enough) = ([0xff; 2 * SECTOR], usize::MAX);
+        let flash = Flash { bytes: &mut bytes, left: &mut enough, random: &random };
+        let mut store = ParameterStore::new(flash, RANGE).expect("two sectors");
+        let (short, long, next) = (record(&random, 40), record(&random, 140), record(&random, 50));
+        let (mut buffer, mut small) = ([0; BUFFER], [0; 64 + OVERHEAD]);
+        assert_eq!(store.write(&short, &mut buffer), Ok(()));
+        assert_eq!(store.write(&long, &mut buffer), Ok(()));
+        assert_eq!(store.read(&mut small), Err(StoreError::Length));
+        assert_eq!(store.read(&mut buffer), Ok(Some(&long[..])));
+        assert_eq!(store.write(&next, &mut small), Ok(()));
+        assert_eq!(store.read(&mut small), Ok(Some(&next[..])));
     }
 
     #[test]

@@ -10,6 +10,7 @@ use thiserror::Error;
 use super::scope::ScopeError;
 use super::trigger::{CAPTURE_MAX, Condition};
 use crate::simulate::RunError;
+use crate::simulate::home::HomesError;
 use crate::simulate::jog::JogError;
 
 /// What a board and a program have to agree on.
@@ -135,13 +136,8 @@ pub enum BoardError {
         failure: HomingFailure,
     },
     /// There is no such axis to home.
-    #[error("found axis {axis}, expected one of those with [axis.homing] in the machine file: {names}")]
-    NoHoming {
-        /// What was asked for.
-        axis: String,
-        /// Which there are.
-        names: String,
-    },
+    #[error(transparent)]
+    NoHoming(#[from] HomesError),
     /// The flight recorder runs again.
     #[error("found a fault that was cleared while its ticks were read, expected it to stay")]
     FlightCleared,
@@ -269,7 +265,7 @@ impl BoardError {
             | Self::UnderWay
             | Self::NothingUnderWay
             | Self::NoProgram
-            | Self::NoHoming { .. }
+            | Self::NoHoming(_)
             | Self::Override { .. }
             | Self::Key(_)
             | Self::Trigger(_)

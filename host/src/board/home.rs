@@ -1,6 +1,6 @@
 //! Homing of a machine on a board: one axis after the other, each to its reference.
 //!
-//! Consumes the axes that are wanted; produces what the board found. The board does it by itself, with its own inputs, and ends
+//! Consumes the axes that are wanted, those of [`Homes`](crate::simulate::home::Homes); produces what the board found. The board does it by itself, with its own inputs, and ends
 //! it at rest where nothing comes from here for the dead man's time.
 
 use std::sync::Arc;
@@ -15,35 +15,6 @@ use super::job::Job;
 use super::sender::{Permissions, Sender, Step};
 use crate::machine::Machine;
 use crate::simulate::home::HomedAxis;
-
-/// The axes that are wanted, or all that can be homed, the lowest bit is the first one's.
-///
-/// # Errors
-/// One is no axis that can be homed, or there is none at all.
-pub fn mask<const N: usize>(machine: &Machine<N>, wanted: &[String]) -> Result<u16, BoardError> {
-    let axes = machine.driven_axes();
-    let homed = |axis: &usize| axes[*axis].homing.is_some();
-    let of = |name: &String| {
-        let found = (0..axes.len()).filter(homed).find(|&axis| axes[axis].name == *name);
-        found.ok_or_else(|| no_homing(machine, name))
-    };
-    let chosen: Vec<usize> = if wanted.is_empty() {
-        (0..axes.len()).filter(homed).collect()
-    } else {
-        wanted.iter().map(of).collect::<Result<_, _>>()?
-    };
-    if chosen.is_empty() {
-        return Err(no_homing(machine, "any"));
-    }
-    Ok(chosen.iter().fold(0, |mask, &axis| mask | 1 << axis))
-}
-
-fn no_homing<const N: usize>(machine: &Machine<N>, axis: &str) -> BoardError {
-    let axes = machine.driven_axes().iter().filter(|axis| axis.homing.is_some());
-    let names: Vec<&str> = axes.map(|axis| axis.name.as_str()).collect();
-    let names = if names.is_empty() { "there is none".to_owned() } else { names.join(", ") };
-    BoardError::NoHoming { axis: axis.to_owned(), names }
-}
 
 /// Homing of a machine with `N` places on a board of `M` axes.
 pub struct OnBoardHoming<'a, const N: usize, const M: usize> {

@@ -13,7 +13,6 @@ use motion_kernel::units::Position;
 
 use super::connection::{Connection, Heard};
 use super::error::BoardError;
-use super::home;
 use super::interface::{Board, BoardAxis, BoardEvent, BoardInfo, BoardState, UnderWay};
 use super::items::Source;
 use super::job::Job;
@@ -28,6 +27,7 @@ use super::wire::Wire;
 use crate::gcode::{self, AXES_MAX};
 use crate::machine::Machine;
 use crate::planning::{Executable, Mode as PlanMode, on_axis_count, plan_program, require_outputs};
+use crate::simulate::home::Homes;
 use crate::simulate::jog::{Keys, Press, WantedJog};
 use crate::simulate::session::jog_axis;
 use crate::simulate::{RunInfo, faults};
@@ -473,7 +473,7 @@ impl<R: Root + Send, const N: usize, const M: usize> Board for Operated<R, N, M>
 
     fn home(&mut self, axes: &[String]) -> Result<(), BoardError> {
         self.require_idle()?;
-        let axes = home::mask(&self.machine, axes)?;
+        let axes = Homes::new(&self.machine, axes)?.mask();
         let mut sender =
             Sender::new(Arc::clone(&self.nothing), Arc::clone(&self.axes), Permissions::default())
                 .homes(axes, DEAD_MAN_MS);

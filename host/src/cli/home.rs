@@ -16,7 +16,7 @@ use super::table::{self, Align};
 use super::trace::TraceArguments;
 use super::units::{InUnit, TableUnits};
 use super::{input, write_json};
-use crate::board::home::{OnBoardHoming, mask};
+use crate::board::home::OnBoardHoming;
 use crate::board::{Connection, Job};
 use crate::files::{Files, interrupt};
 use crate::machine::{Machine, on_machine};
@@ -94,7 +94,7 @@ fn home<const N: usize>(
 ) -> Result<Outcome, CliError> {
     let name = arguments.machine.display().to_string();
     let refused = |source: HomeError| CliError::Home { machine: name.clone(), source };
-    let homes = Homes::new(machine, &arguments.axes).map_err(refused)?;
+    let homes = Homes::new(machine, &arguments.axes).map_err(|error| refused(error.into()))?;
     if let Some(port) = arguments.board.given() {
         if arguments.trace.trace.is_some() {
             let found = "--trace with --port".to_owned();
@@ -105,7 +105,10 @@ fn home<const N: usize>(
         }
         let dead_man_ms = arguments.board.dead_man_ms()?;
         let (port, is_json) = (&port, arguments.json);
-        return port.on_board(machine, OnHoming { machine, arguments, port, dead_man_ms, is_json, out });
+        return port.on_board(
+            machine,
+            OnHoming { machine, arguments, axes: homes.mask(), port, dead_man_ms, is_json, out },
+        );
     }
     let mut homed = Vec::new();
     let info = RunInfo::of_machine(machine);
@@ -121,6 +124,8 @@ fn home<const N: usize>(
 struct OnHoming<'a, const N: usize> {
     machine: &'a Machine<N>,
     arguments: &'a HomeArguments,
+    /// Those to home, the lowest bit is the first one's.
+    axes: u16,
     port: &'a PortArguments,
     dead_man_ms: u16,
     is_json: bool,
@@ -130,8 +135,7 @@ struct OnHoming<'a, const N: usize> {
 impl<const N: usize> OnBoard for OnHoming<'_, N> {
     /// Homes, until Ctrl-C.
     fn run<R: Root + Send, const M: usize>(self, mut connection: Connection<M>) -> Result<Outcome, CliError> {
-        let Self { machine, arguments, port, dead_man_ms, is_json, out } = self;
-        let axes = mask(machine, &arguments.axes).map_err(|error| port.refused(error))?;
+        let Self { machine, arguments, axes, port, dead_man_ms, is_json, out } = self;
         let job = Arc::new(Job::<M>::new(machine, &[]));
         let may = arguments.board.permissions();
         let homing = OnBoardHoming { machine, job, may, dead_man_ms };
@@ -152,7 +156,11 @@ impl<const N: usize> OnBoard for OnHoming<'_, N> {
         let _ = connection.settle();
         show(&homed, machine.tick_s, is_json, out)?;
         let is_given_up = ended.map_err(|error| port.refused(error))?;
-        Ok(if is_given_up { Outcome::Aborted } else { Outcome::Done })
+        if is_given_up {
+            eprintln!("given up: the machine is at rest");
+            return Ok(Outcome::Aborted);
+        }
+        Ok(Outcome::Done)
     }
 }
 

@@ -15,15 +15,28 @@ use super::session::{Session, SessionError, Then, jog_axis};
 use crate::axis_unit::AxisUnit;
 use crate::machine::{HomingSettings, Machine};
 
-/// Why the machine is not homed. Displays as one line.
-#[derive(Debug, thiserror::Error)]
-pub enum HomeError {
+/// Why axes are not those that can be homed. Displays as one line.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum HomesError {
     /// No axis has homing settings.
     #[error("found no [axis.homing], expected one for each axis that is to be homed")]
     NoAxis,
     /// There is no such axis.
-    #[error("found axis {0}, expected one with [axis.homing]")]
-    Name(String),
+    #[error("found axis {found}, expected one with [axis.homing]: {names}")]
+    Name {
+        /// What was asked for.
+        found: String,
+        /// Which there are.
+        names: String,
+    },
+}
+
+/// Why the machine is not homed. Displays as one line.
+#[derive(Debug, thiserror::Error)]
+pub enum HomeError {
+    /// There is no such axis to home.
+    #[error(transparent)]
+    Axes(#[from] HomesError),
     /// An axis was not homed.
     #[error("axis {axis}: {source}")]
     Axis {
@@ -132,16 +145,28 @@ impl<'a, const N: usize> Homes<'a, N> {
     ///
     /// # Errors
     /// There are none, or one of the names is none of theirs.
-    pub fn new(machine: &'a Machine<N>, names: &[String]) -> Result<Self, HomeError> {
+    pub fn new(machine: &'a Machine<N>, names: &[String]) -> Result<Self, HomesError> {
         let settings = machine.driven_axes().iter().enumerate();
         let axes = settings.filter_map(|(axis, of)| Some((axis, of.homing.as_ref()?)));
         let name = |axis: usize| &machine.axes[axis].name;
         let mut axes: Vec<_> = axes.collect();
         if let Some(other) = names.iter().find(|other| axes.iter().all(|&(axis, _)| name(axis) != *other)) {
-            return Err(HomeError::Name(other.clone()));
+            let names: Vec<&str> = axes.iter().map(|&(axis, _)| name(axis).as_str()).collect();
+            let (found, names) = (other.clone(), names.join(", "));
+            return Err(if names.is_empty() {
+                HomesError::NoAxis
+            } else {
+                HomesError::Name { found, names }
+            });
         }
         axes.retain(|&(axis, _)| names.is_empty() || names.contains(name(axis)));
-        if axes.is_empty() { Err(HomeError::NoAxis) } else { Ok(Self { machine, axes }) }
+        if axes.is_empty() { Err(HomesError::NoAxis) } else { Ok(Self { machine, axes }) }
+    }
+
+    /// As a board is told them: the lowest bit is the first one's.
+    #[must_use]
+    pub fn mask(&self) -> u16 {
+        self.axes.iter().fold(0, |mask, &(axis, _)| mask | 1 << axis)
     }
 
     /// Homes one after the other, into `homed`.

@@ -55,7 +55,7 @@ fn home_on_a_board() {
     assert!(there[0]["true_mm"].is_null() && number(&there[0]["position_mm"]).abs() < 0.01, "{there}");
     assert_eq!(
         workspace.refusal(&["home", "--machine", "homed.toml", "--axis", "Y"]),
-        "homed.toml: found axis Y, expected one with [axis.homing]"
+        "homed.toml: found axis Y, expected one with [axis.homing]: X"
     );
     // The same board has had no fault.
     let empty = workspace.motion(&["flight", "--port", "simulator"]);

@@ -7,7 +7,7 @@ pub struct Checksum(u32);
 
 impl Checksum {
     /// The checksum of no bytes.
-    pub(super) const NONE: Self = Self(u32::MAX);
+    pub const NONE: Self = Self(u32::MAX);
     /// The remainders of the four bits that leave, for the polynomial with its least significant bit first.
     // In a constant: an index beyond the table does not compile.
     #[allow(clippy::indexing_slicing)]
@@ -34,7 +34,7 @@ impl Checksum {
     }
 
     /// Adds bytes.
-    pub(super) fn update(&mut self, bytes: &[u8]) {
+    pub fn update(&mut self, bytes: &[u8]) {
         for &byte in bytes {
             self.0 ^= u32::from(byte);
             self.leave();
@@ -52,7 +52,7 @@ impl Checksum {
 
     /// The 32 bits.
     #[must_use]
-    pub(super) fn finish(self) -> u32 {
+    pub fn finish(self) -> u32 {
         !self.0
     }
 }

@@ -49,9 +49,9 @@ pub(super) struct Record {
     /// The program line there, and where motion was \[mm\].
     pub line: u32,
     pub set_mm: Vec<f64>,
-    /// Whether each axis was homed there.
+    /// Whether each axis was homed there; none where nothing was driven yet.
     #[serde(default)]
-    pub homed: Vec<bool>,
+    pub homed: Option<Vec<bool>>,
     /// All is driven.
     pub is_finished: bool,
 }
@@ -84,7 +84,7 @@ impl Record {
             driven: 0,
             line: 0,
             set_mm: Vec::new(),
-            homed: Vec::new(),
+            homed: None,
             is_finished: false,
         }
     }
@@ -207,7 +207,7 @@ impl Journal {
     pub(super) fn note(&mut self, place: Place, set_mm: Vec<f64>, homed: Vec<bool>) {
         if self.record.set_mm.is_empty() || self.record.driven != place.driven {
             (self.record.driven, self.record.line, self.record.set_mm) = (place.driven, place.line, set_mm);
-            self.record.homed = homed;
+            self.record.homed = Some(homed);
             self.put();
         }
     }

@@ -231,12 +231,14 @@ impl Resumed {
         }
         let homed = homed(connection).ok_or_else(|| self.refused(ResumeError::Position))?;
         for (number, axis) in axes.iter().enumerate().filter(|(_, axis)| is_told(axis)) {
-            let was_homed = record.homed.get(number).copied().unwrap_or(false);
+            let was_homed = record.homed.as_ref().and_then(|homed| homed.get(number).copied());
             let is_homed = homed.get(number).copied().unwrap_or(false);
-            if !is_homed && (was_homed || !has_run) {
+            if !is_homed && (was_homed == Some(true) || !has_run) {
                 return Err(self.refused(ResumeError::NotHomed(axis.name.clone())));
             }
-            if is_homed && !was_homed {
+            // What was not driven yet has no zero to lose.
+            let had_zero = record.homed.is_some() || record.driven > 0;
+            if is_homed && had_zero && was_homed != Some(true) {
                 return Err(self.refused(ResumeError::HomedSince(axis.name.clone())));
             }
         }
