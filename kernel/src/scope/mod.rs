@@ -31,8 +31,14 @@ mod log;
 mod record;
 mod replay;
 mod ring;
+#[cfg(test)]
+mod ring_tests;
 mod snapshot;
 mod wire;
+/// Those of the ring; its check has its own.
+mod words {
+    pub(super) use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU16, AtomicU32, AtomicUsize, Ordering};
+}
 
 pub use board::{BODY_MAX, BoardScope, Body, ScopeMemory};
 pub(crate) use log::{Begun, Handed};

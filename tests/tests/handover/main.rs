@@ -10,11 +10,15 @@
 //!
 //! In both, a list that takes over is complete, its items are done in their order, items are dropped only of a list that was
 //! given up and all of those in the end, and the change that was asked for last is followed or refused.
+//!
+//! `scope_one_core` and `scope_two_cores` do the same with the ring through which ticks reach the link (`scope_model`).
 
 #![allow(clippy::duplicate_mod, reason = "the same files with the words of each check")]
 #![allow(dead_code, unreachable_pub, reason = "the kernel's files hold more than the checks use")]
 
 mod one_core;
+mod scope_one_core;
+mod scope_two_cores;
 mod two_cores;
 
 /// What the kernel's files find at the crate's root.
@@ -24,4 +28,13 @@ mod law {
 }
 mod num {
     pub(crate) use motion_kernel::num::Real;
+}
+mod hal {
+    pub(crate) use motion_kernel::hal::AxisInputs;
+}
+mod trace {
+    pub(crate) use motion_kernel::trace::Trace;
+}
+mod units {
+    pub(crate) use motion_kernel::units::DacCode;
 }
