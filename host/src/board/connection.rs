@@ -7,6 +7,7 @@ use motion_kernel::link::{Build, Controls, Event, FRAME_MAX, HostLink, Identity,
 use motion_kernel::program::Item;
 
 use super::error::BoardError;
+use super::numbers::Numbers;
 use super::scope::{Scope, ScopeSummary};
 use super::wire::Wire;
 
@@ -234,6 +235,12 @@ impl<const N: usize> Connection<N> {
     #[must_use]
     pub fn identity(&self) -> Option<&Identity> {
         self.identity.as_ref()
+    }
+
+    /// The board's number type; before it has answered, that of most.
+    #[must_use]
+    pub fn numbers(&self) -> Numbers {
+        self.identity().map_or(Numbers::F32, Numbers::of)
     }
 
     /// The number of its start, once it has answered: after another start it is another one.

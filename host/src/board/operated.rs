@@ -1,6 +1,5 @@
 //! A board at a port, of a machine file: the one [`Board`] there is. The simulated machine is behind a wire, too.
 
-use std::marker::PhantomData;
 use std::mem::take;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -8,7 +7,6 @@ use std::thread;
 use std::time::Duration;
 
 use motion_kernel::link::{Event, HomingProgress, Mode, State};
-use motion_kernel::num::{Fixed, Root};
 use motion_kernel::units::Position;
 
 use super::connection::{Connection, Heard};
@@ -16,6 +14,7 @@ use super::error::BoardError;
 use super::interface::{Board, BoardAxis, BoardEvent, BoardInfo, BoardState, UnderWay};
 use super::items::Source;
 use super::job::Job;
+use super::numbers::{Numbers, in_numbers};
 use super::parameters;
 use super::port::{Port, unique};
 use super::scope::{Scope, Ticks};
@@ -50,17 +49,14 @@ pub fn open<const N: usize>(
         let mut wire = Some(Box::new(wire) as Box<dyn Wire>);
         let open = Box::new(move || wire.take().ok_or_else(|| std::io::ErrorKind::BrokenPipe.into()));
         let connection = Connection::<N>::open(open, unique())?;
-        return Ok(Box::new(Operated::<f32, N, N>::new(machine, port, connection, Some(board))?));
+        return Ok(Box::new(Operated::<N, N>::new(machine, port, connection, Some(board))?));
     }
     on_axis_count!(machine.axis_count(), in N, M => {
         let from = port.clone();
         let open = Box::new(move || from.open(baud));
         let mut connection = Connection::<M>::open(open, unique())?;
         connection.greet()?;
-        if connection.identity().is_some_and(|identity| identity.is_fixed_point) {
-            return Ok(Box::new(Operated::<Fixed, N, M>::new(machine, port, connection, None)?));
-        }
-        Ok(Box::new(Operated::<f32, N, M>::new(machine, port, connection, None)?))
+        Ok(Box::new(Operated::<N, M>::new(machine, port, connection, None)?))
     })
 }
 
@@ -143,8 +139,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A board of `M` axes in the number type `R`, with a machine of `N` places.
-struct Operated<R, const N: usize, const M: usize> {
+/// A board of `M` axes, with a machine of `N` places.
+struct Operated<const N: usize, const M: usize> {
     machine: Arc<Machine<N>>,
     info: BoardInfo,
     /// A job without items.
@@ -158,10 +154,9 @@ struct Operated<R, const N: usize, const M: usize> {
     capture: Arc<Mutex<Capture<M>>>,
     /// Behind the wire; it ends with this.
     _simulated: Option<SimulatedBoard>,
-    number: PhantomData<fn() -> R>,
 }
 
-impl<R: Root + Send, const N: usize, const M: usize> Operated<R, N, M> {
+impl<const N: usize, const M: usize> Operated<N, M> {
     fn new(
         machine: &Machine<N>,
         port: &Port,
@@ -169,7 +164,8 @@ impl<R: Root + Send, const N: usize, const M: usize> Operated<R, N, M> {
         simulated: Option<SimulatedBoard>,
     ) -> Result<Self, BoardError> {
         connection.greet()?;
-        machine.axes_config::<R>().map_err(|error| BoardError::Program(Box::new(error)))?;
+        in_numbers!(connection.numbers(), R => machine.axes_config::<R>().map(|_| ()))
+            .map_err(|error| BoardError::Program(Box::new(error)))?;
         let nothing = Arc::new(Job::<M>::new(machine, &[]));
         let identity = connection.identity().copied().ok_or(BoardError::Silent)?;
         check(&nothing, &identity)?;
@@ -200,7 +196,6 @@ impl<R: Root + Send, const N: usize, const M: usize> Operated<R, N, M> {
             is_at_stop: false,
             capture: Arc::default(),
             _simulated: simulated,
-            number: PhantomData,
         })
     }
 
@@ -270,7 +265,7 @@ impl<R: Root + Send, const N: usize, const M: usize> Operated<R, N, M> {
     }
 }
 
-impl<R: Root + Send, const N: usize, const M: usize> Board for Operated<R, N, M> {
+impl<const N: usize, const M: usize> Board for Operated<N, M> {
     fn info(&self) -> &BoardInfo {
         &self.info
     }
@@ -366,10 +361,11 @@ impl<R: Root + Send, const N: usize, const M: usize> Board for Operated<R, N, M>
         }
         let (to, planned) = channel();
         let (machine, outputs) = (Arc::clone(&self.machine), self.connection.identity().copied());
+        let numbers = self.connection.numbers();
         self.program = None;
         self.planning = Some(planned);
         thread::spawn(move || {
-            let planned = plan::<R, N, M>(&source, &machine).and_then(|(program, notes)| {
+            let planned = plan::<N, M>(numbers, &source, &machine).and_then(|(program, notes)| {
                 if let Some(identity) = outputs {
                     check_outputs(&source.name, &program.job, identity.outputs)?;
                 }
@@ -569,7 +565,11 @@ impl Behind {
 }
 
 /// Reads and plans a program for a board.
-fn plan<R: Root + Send, const N: usize, const M: usize>(source: &Source, machine: &Machine<N>) -> Planned<M> {
+fn plan<const N: usize, const M: usize>(
+    numbers: Numbers,
+    source: &Source,
+    machine: &Machine<N>,
+) -> Planned<M> {
     let refused = |error: Box<dyn std::error::Error + Send + Sync>| BoardError::Program(error);
     let program = gcode::read_with(&source.name, &source.text, &source.options)
         .map_err(|error| refused(error.into()))?;
@@ -579,7 +579,8 @@ fn plan<R: Root + Send, const N: usize, const M: usize>(source: &Source, machine
     let plan = plan_program(&source.name, &program, machine, PlanMode::Spanning)
         .map_err(|error| refused(error.into()))?;
     plan.refuse_probes().map_err(|error| refused(error.into()))?;
-    let items = Executable::new::<R>(&plan).map_err(|error| refused(error.into()))?.items;
+    let executable = in_numbers!(numbers, R => Executable::new::<R>(&plan));
+    let items = executable.map_err(|error| refused(error.into()))?.items;
     let job = Job::new(machine, &items);
     let stops = Stops::new(&program, &plan, &job);
     Ok((Loaded { name: source.name.clone(), job: Arc::new(job), stops }, plan.notices))

@@ -11,11 +11,12 @@ use std::thread::{self, JoinHandle};
 
 use motion_kernel::axis::{AxesConfig, AxesError};
 use motion_kernel::link::{Build, Identity, Piece};
-use motion_kernel::num::{Fixed, Real};
+use motion_kernel::num::Real;
 use motion_kernel::program::{Header, Item, ProgramError, Reader};
 use motion_kernel::queue::LiveStreams;
 use motion_kernel::scope::{Replay, ReplayError, Told};
 
+use super::numbers::{Numbers, in_numbers};
 use crate::simulate::contour::Contour;
 use crate::simulate::run::trace_row;
 use crate::trace::TraceRow;
@@ -108,11 +109,7 @@ impl<const N: usize> Scope<N> {
         if identity.build.kernel != Build::THIS.kernel {
             return Err(ScopeError::Kernel(identity.build.kernel));
         }
-        if identity.is_fixed_point {
-            Self::start_in::<Fixed>(parameters, sink)
-        } else {
-            Self::start_in::<f32>(parameters, sink)
-        }
+        in_numbers!(Numbers::of(identity), R => Self::start_in::<R>(parameters, sink))
     }
 
     fn start_in<R: Real>(parameters: &[u8], sink: Sink<N>) -> Result<Self, ScopeError> {
@@ -231,4 +228,33 @@ fn run<R: Real, const N: usize>(
         }
     }
     summary
+}
+
+#[cfg(test)]
+mod tests {
+    use motion_kernel::hal::BoardOutputs;
+
+    use super::*;
+
+    #[test]
+    fn ticks_of_another_kernel_are_not_run_again() {
+        let kernel = [u16::MAX, 1, 2];
+        let identity = Identity {
+            build: Build { kernel, ..Build::THIS },
+            format: 0,
+            axes: 3,
+            is_fixed_point: false,
+            tick_s: 0.0005,
+            items: 8,
+            outputs: BoardOutputs::FixedSpeed,
+            machine: 0,
+        };
+        let started = Scope::<3>::start(&identity, &[], Box::new(|_| {}));
+        let Err(error) = started else { panic!("it is started") };
+        assert_eq!(error, ScopeError::Kernel(kernel));
+        assert!(
+            error.to_string().starts_with("found a board with kernel 65535.1.2, expected kernel "),
+            "{error}"
+        );
+    }
 }

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 use motion_kernel::flight::FlightRow;
-use motion_kernel::num::Root;
 
 use super::error::{CliError, Outcome};
 use super::input::{self, Source};
@@ -95,7 +94,7 @@ struct OnFlight<'a, const N: usize> {
 }
 
 impl<const N: usize> OnBoard for OnFlight<'_, N> {
-    fn run<R: Root + Send, const M: usize>(self, mut connection: Connection<M>) -> Result<Outcome, CliError> {
+    fn run<const M: usize>(self, mut connection: Connection<M>) -> Result<Outcome, CliError> {
         let Self { machine, port, outputs, out } = self;
         let kept = board::flight::read(&mut connection).map_err(|error| port.refused(error))?;
         if kept.is_empty() {

@@ -6,7 +6,6 @@ use std::sync::Arc;
 
 use clap::Args;
 use motion_kernel::homing::HomingStage;
-use motion_kernel::num::Root;
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
@@ -134,7 +133,7 @@ struct OnHoming<'a, const N: usize> {
 
 impl<const N: usize> OnBoard for OnHoming<'_, N> {
     /// Homes, until Ctrl-C.
-    fn run<R: Root + Send, const M: usize>(self, mut connection: Connection<M>) -> Result<Outcome, CliError> {
+    fn run<const M: usize>(self, mut connection: Connection<M>) -> Result<Outcome, CliError> {
         let Self { machine, arguments, axes, port, dead_man_ms, is_json, out } = self;
         let job = Arc::new(Job::<M>::new(machine, &[]));
         let may = arguments.board.permissions();

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::Args;
-use motion_kernel::num::Root;
 use serde::Serialize;
 
 use super::error::{CliError, Outcome};
@@ -161,7 +160,7 @@ struct OnKeys<'a, const N: usize> {
 
 impl<const N: usize> OnBoard for OnKeys<'_, N> {
     /// Presses the keys, which Ctrl-C releases.
-    fn run<R: Root + Send, const M: usize>(self, mut connection: Connection<M>) -> Result<Outcome, CliError> {
+    fn run<const M: usize>(self, mut connection: Connection<M>) -> Result<Outcome, CliError> {
         let Self { machine, arguments, port, keys, dead_man_ms, out } = self;
         let job = Arc::new(Job::<M>::new(machine, &[]));
         let axes = machine.axis_names();

@@ -1,7 +1,6 @@
 //! A board at a port, for the commands that talk to one.
 
 use clap::Args;
-use motion_kernel::num::{Fixed, Root};
 
 use super::error::{CliError, Outcome};
 use crate::board::port::unique;
@@ -131,7 +130,7 @@ impl PortArguments {
         Ok((connection, board))
     }
 
-    /// Connects to a board for a machine, waits for its answer, and does the work in its number type.
+    /// Connects to a board for a machine, waits for its answer, and does the work.
     pub(super) fn on_board<const N: usize>(
         &self,
         machine: &Machine<N>,
@@ -140,15 +139,12 @@ impl PortArguments {
         if self.port == Port::Simulator {
             let (mut connection, _board) = self.simulated(machine)?;
             connection.greet().map_err(|error| self.refused(error))?;
-            return work.run::<f32, N>(connection);
+            return work.run::<N>(connection);
         }
         on_axis_count!(machine.axis_count(), in N, M => {
             let mut connection = self.open::<M>()?;
             connection.greet().map_err(|error| self.refused(error))?;
-            if connection.identity().is_some_and(|identity| identity.is_fixed_point) {
-                return work.run::<Fixed, M>(connection);
-            }
-            work.run::<f32, M>(connection)
+            work.run::<M>(connection)
         })
     }
 
@@ -162,6 +158,6 @@ impl PortArguments {
 
 /// What a command does with a board that has answered.
 pub(super) trait OnBoard {
-    /// With a board of `M` axes, whose kernel is of the number type `R`.
-    fn run<R: Root + Send, const M: usize>(self, connection: Connection<M>) -> Result<Outcome, CliError>;
+    /// With a board of `M` axes.
+    fn run<const M: usize>(self, connection: Connection<M>) -> Result<Outcome, CliError>;
 }

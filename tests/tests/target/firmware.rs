@@ -64,11 +64,11 @@ fn printed(tools: &Tools) -> Result<&'static [String], String> {
 }
 
 /// The emulator with an image, not yet started. Of its serial ports the second one is the console, or the link. Ended with
-/// `timeout`, which runs it.
-pub(crate) fn emulator(image: &Path, serial: &str, shift: u32) -> Command {
+/// `timeout`, which runs it. `monitor` is where it takes commands.
+pub(crate) fn emulator(image: &Path, serial: &str, monitor: &str, shift: u32) -> Command {
     let mut emulator = Command::new("timeout");
     emulator
-        .args(["600", "qemu-system-arm", "-M", "netduinoplus2", "-display", "none", "-monitor", "none"])
+        .args(["600", "qemu-system-arm", "-M", "netduinoplus2", "-display", "none", "-monitor", monitor])
         .args(["-serial", "null", "-serial", serial, "-semihosting-config", "enable=on,target=native"])
         .args(["-icount", &format!("shift={shift},sleep=off"), "-kernel"])
         .arg(image);
@@ -77,7 +77,7 @@ pub(crate) fn emulator(image: &Path, serial: &str, shift: u32) -> Command {
 
 fn run(tools: &Tools) -> Result<Vec<String>, String> {
     let image = tools.firmware("emulated")?;
-    let mut emulator = emulator(&image, "stdio", SHIFT);
+    let mut emulator = emulator(&image, "stdio", "none", SHIFT);
     emulator
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())

@@ -18,6 +18,7 @@ use motion_kernel::link::{Build, Event, FRAME_MAX, HostLink, Mode, State, Status
 use motion_kernel::program::{FORMAT, Item, Reader};
 use motion_kernel::straight::Straight;
 use motion_kernel::units::Position;
+use object::{Object, ObjectSymbol};
 
 use crate::firmware::{AT_REST_MM, END_MM, emulator, instructions};
 use crate::tools::Tools;
@@ -30,6 +31,8 @@ const SLOWER: u128 = 20;
 const SHIFT: u32 = 5;
 /// Written as the firmware has it in flash.
 const PROGRAM: &[u8] = include_bytes!("../../../boards/common/program/stringer.bin");
+/// What has to be left of the stack for what this test does not do \[bytes\].
+const STACK_LEFT_MIN: usize = 1024;
 /// Path after which the second program is aborted \[mm\].
 const ABORT_AFTER_MM: f64 = 2.0;
 
@@ -220,12 +223,43 @@ fn take_parameters(pc: &mut Pc) -> Result<(), String> {
     if pc.read.0 == record { Ok(()) } else { Err("the board has other parameters than it took".to_owned()) }
 }
 
-/// Drives an emulated board with the image; what its log says.
-fn run(image: &Path) -> Result<Vec<String>, String> {
+/// Bytes of an image's stack that were never used, of how many. Memory that nothing was written to is 0 on the emulator.
+fn stack_left(image: &Path, mut monitor: &TcpStream) -> Result<(usize, usize), String> {
+    let failed = |error: std::io::Error| format!("the emulator's monitor: {error}");
+    let elf = std::fs::read(image).map_err(failed)?;
+    let file = object::File::parse(&*elf).map_err(|error| error.to_string())?;
+    let symbol = |name: &str| {
+        let found = file.symbols().find(|symbol| symbol.name() == Ok(name));
+        found.map(|symbol| symbol.address()).ok_or_else(|| format!("no symbol {name}"))
+    };
+    let (low, high) = (symbol("_stack_end")?, symbol("_stack_start")?);
+    let folder = tempfile::tempdir().map_err(failed)?;
+    let path = folder.path().join("stack");
+    writeln!(monitor, "pmemsave {low} {} \"{}\"", high - low, path.display()).map_err(failed)?;
+    // Bounded by the emulator's time-out, which closes the monitor.
+    let mut said = [0; 1024];
+    let stack = loop {
+        match std::fs::read(&path) {
+            Ok(stack) if stack.len() as u64 == high - low => break stack,
+            _ if monitor.read(&mut said).is_ok_and(|count| count == 0) => {
+                return Err("the emulator has closed its monitor".to_owned());
+            }
+            _ => {}
+        }
+    };
+    let left = stack.iter().position(|byte| *byte != 0).unwrap_or(stack.len());
+    Ok((left, stack.len()))
+}
+
+/// Drives an emulated board with the image; what its log says, and how much of its stack is left.
+fn run(image: &Path) -> Result<(Vec<String>, (usize, usize)), String> {
     let failed = |error: std::io::Error| error.to_string();
-    let listener = TcpListener::bind("127.0.0.1:0").map_err(failed)?;
-    let port = listener.local_addr().map_err(failed)?.port();
-    let mut running = emulator(image, &format!("tcp:127.0.0.1:{port}"), SHIFT)
+    let [listener, monitor] = [TcpListener::bind("127.0.0.1:0"), TcpListener::bind("127.0.0.1:0")];
+    let (listener, monitor) = (listener.map_err(failed)?, monitor.map_err(failed)?);
+    let place = |listener: &TcpListener| {
+        listener.local_addr().map(|address| format!("tcp:{address}")).map_err(failed)
+    };
+    let mut running = emulator(image, &place(&listener)?, &place(&monitor)?, SHIFT)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
@@ -239,7 +273,9 @@ fn run(image: &Path) -> Result<Vec<String>, String> {
             read.lock().expect("nobody panics with it").push(line);
         }
     });
-    let driven = connect(&listener, &mut running).and_then(|stream| {
+    // It connects the monitor first.
+    let driven = connect(&monitor, &mut running).and_then(|monitor| {
+        let stream = connect(&listener, &mut running)?;
         let (begin, link) = (Instant::now(), HostLink::new(1));
         let machine = Job::<AXES>::new(&Machine::reference(), &[]).machine;
         drive(&mut Pc {
@@ -253,7 +289,8 @@ fn run(image: &Path) -> Result<Vec<String>, String> {
             read: (Vec::new(), None),
             has_restarted: false,
             items: VecDeque::new(),
-        })
+        })?;
+        stack_left(image, &monitor)
     });
     // It would run forever; a signal to `timeout` ends both.
     let ended = std::process::Command::new("kill").arg(running.id().to_string()).status();
@@ -261,7 +298,7 @@ fn run(image: &Path) -> Result<Vec<String>, String> {
     let _ = reader.join();
     let lines = std::mem::take(&mut *lines.lock().map_err(|_| "the log's reader panicked")?);
     match driven {
-        Ok(()) => Ok(lines),
+        Ok(stack) => Ok((lines, stack)),
         Err(error) => {
             let end: Vec<_> =
                 lines.iter().filter(|line| !line.starts_with("interrupt ")).rev().take(5).collect();
@@ -293,7 +330,11 @@ fn connect(listener: &TcpListener, running: &mut std::process::Child) -> Result<
 }
 
 pub(crate) fn a_pc_drives_the_firmware(tools: &Tools) -> Result<(), String> {
-    let lines = run(&tools.firmware("emulated,link")?)?;
+    let (lines, (left, stack)) = run(&tools.firmware("emulated,link")?)?;
+    println!("stack, linked: {} of {stack} bytes used", stack - left);
+    if left < STACK_LEFT_MIN {
+        return Err(format!("{left} bytes of the stack are left, expected {STACK_LEFT_MIN}"));
+    }
     println!("instructions of the interrupt, linked: {:?}", instructions(lines.iter(), SHIFT)?);
     if let Some(line) = lines.iter().find(|line| line.contains("Fault(") || line.contains("Refused(")) {
         return Err(format!("the log says {line:?}"));

@@ -14,7 +14,6 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use motion_kernel::link::State;
-use motion_kernel::num::Root;
 use motion_kernel::program::Checksum;
 
 use self::confirm::Middle;
@@ -31,7 +30,7 @@ use crate::board::items::{Said, Source};
 use crate::board::progress::{Place, Progress};
 use crate::board::sender::{Found, check, check_outputs};
 use crate::board::stops::Stops;
-use crate::board::{BoardError, Connection, Heard, InPlanning, Job, Sender, Step};
+use crate::board::{BoardError, Connection, Heard, InPlanning, Job, Numbers, Sender, Step, in_numbers};
 use crate::files::STANDARD_INPUT;
 use crate::files::interrupt::{self, Asked};
 use crate::gcode::{self, Program, ReadOptions};
@@ -159,7 +158,7 @@ fn send_program(
             writeln!(out, "note: {notice}").map_err(CliError::Output)?;
         }
         // What the board is, is not known yet; most are of f32.
-        holds_axes::<f32, _>(machine)?;
+        holds_axes(Numbers::F32, machine)?;
         let sent = &program;
         arguments.port.on_board(machine, Planned { sent, plan: &plan, machine, out })
     })
@@ -199,9 +198,9 @@ struct Streamed<'a, const N: usize> {
 }
 
 impl<const N: usize> OnBoard for Streamed<'_, N> {
-    fn run<R: Root + Send, const M: usize>(self, connection: Connection<M>) -> Result<Outcome, CliError> {
+    fn run<const M: usize>(self, connection: Connection<M>) -> Result<Outcome, CliError> {
         let Self { arguments, source, name, machine, out } = self;
-        holds_axes::<R, N>(machine)?;
+        holds_axes(connection.numbers(), machine)?;
         let job = Job::<M>::in_planning(machine, 0);
         let job = Job { name: job_name(name, job.machine), ..job };
         let subject = Subject {
@@ -213,7 +212,7 @@ impl<const N: usize> OnBoard for Streamed<'_, N> {
         };
         let journal = Journal::open(arguments, &subject)?;
         let lines = source.text.iter().filter(|&&byte| byte == b'\n').count() as u64;
-        let planned = InPlanning::begin::<R, N>(source, machine);
+        let planned = in_numbers!(connection.numbers(), R => InPlanning::begin::<R, N>(source, machine));
         let driven = Driven {
             job: Arc::new(job),
             planned: Some(planned),
@@ -248,9 +247,9 @@ fn found(arguments: &SendArguments) -> Found {
 }
 
 /// Refuses a machine whose axes a kernel of the number type does not hold.
-fn holds_axes<R: Root, const N: usize>(machine: &Machine<N>) -> Result<(), CliError> {
-    let axes = machine.axes_config::<R>();
-    axes.map(|_| ()).map_err(|source| CliError::Axis { machine: machine.name.clone(), source })
+fn holds_axes<const N: usize>(numbers: Numbers, machine: &Machine<N>) -> Result<(), CliError> {
+    let axes = in_numbers!(numbers, R => machine.axes_config::<R>().map(|_| ()));
+    axes.map_err(|source| CliError::Axis { machine: machine.name.clone(), source })
 }
 
 /// A program that is planned.
@@ -262,24 +261,26 @@ struct Planned<'a, const N: usize> {
 }
 
 impl<const N: usize> OnBoard for Planned<'_, N> {
-    fn run<R: Root + Send, const M: usize>(self, connection: Connection<M>) -> Result<Outcome, CliError> {
+    fn run<const M: usize>(self, connection: Connection<M>) -> Result<Outcome, CliError> {
         let Self { sent, plan, machine, out } = self;
-        let job = job::<R, N, M>(plan, machine)?;
-        send_job::<R, N, M>(sent, (plan, job), machine, connection, out)
+        let job = job::<N, M>(connection.numbers(), plan, machine)?;
+        send_job::<N, M>(sent, (plan, job), machine, connection, out)
     }
 }
 
 /// The plan as items, in the board's number type, if that holds its axes, too.
-fn job<R: Root, const N: usize, const M: usize>(
+fn job<const N: usize, const M: usize>(
+    numbers: Numbers,
     plan: &Plan<N>,
     machine: &Machine<N>,
 ) -> Result<Job<M>, CliError> {
-    holds_axes::<R, N>(machine)?;
-    Ok(Job::new(machine, &Executable::new::<R>(plan)?.items))
+    holds_axes(numbers, machine)?;
+    let executable = in_numbers!(numbers, R => Executable::new::<R>(plan))?;
+    Ok(Job::new(machine, &executable.items))
 }
 
 /// Drives the job, or the rest of it that is asked for.
-fn send_job<R: Root, const N: usize, const M: usize>(
+fn send_job<const N: usize, const M: usize>(
     sent: &Sent<'_>,
     (plan, whole): (&Plan<N>, Job<M>),
     machine: &Machine<N>,
@@ -301,11 +302,11 @@ fn send_job<R: Root, const N: usize, const M: usize>(
                 found = Found::GivenUp;
             }
             let (job, middle) =
-                resumed.rest::<R, N, M>(machine, program, (&whole, name), arguments.yes, &mut connection)?;
+                resumed.rest::<N, M>(machine, program, (&whole, name), arguments.yes, &mut connection)?;
             (job, Some(middle))
         }
         (None, Some(line)) => {
-            let (job, middle) = from_line_on::<R, M>(arguments, program, &whole, line)?;
+            let (job, middle) = from_line_on(arguments, program, (connection.numbers(), &whole), line)?;
             (job, Some(middle))
         }
         (None, None) => (whole, None),
@@ -339,10 +340,10 @@ struct Driven<const M: usize> {
 }
 
 /// The job from a line on, and what there is to confirm.
-fn from_line_on<R: Root, const M: usize>(
+fn from_line_on<const M: usize>(
     arguments: &SendArguments,
     program: &Program,
-    whole: &Job<M>,
+    (numbers, whole): (Numbers, &Job<M>),
     line: u32,
 ) -> Result<(Job<M>, Middle), CliError> {
     let name = arguments.program.display().to_string();
@@ -351,7 +352,8 @@ fn from_line_on<R: Root, const M: usize>(
         line,
         source,
     })?;
-    let job = whole.from_item::<R>(found.item).map_err(|problem| PlanningError::at_line(&name, problem))?;
+    let job = in_numbers!(numbers, R => whole.from_item::<R>(found.item));
+    let job = job.map_err(|problem| PlanningError::at_line(&name, problem))?;
     let why = match found.line {
         same if same == line => "",
         later if later > line => ", the next one with motion",

@@ -5,14 +5,13 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use clap::Args;
-use motion_kernel::num::Root;
 use motion_kernel::program::Checksum;
 use thiserror::Error;
 
 use super::confirm::Middle;
 use super::journal::{Record, default_path};
 use super::{SendArguments, job_name, send_program};
-use crate::board::{Connection, Job};
+use crate::board::{Connection, Job, in_numbers};
 use crate::cli::error::{CliError, Outcome};
 use crate::cli::input;
 use crate::cli::port::{DriveArguments, PortArguments};
@@ -183,7 +182,7 @@ impl Resumed {
     }
 
     /// What is left of the whole `job`, which is made of what has the checksum `input`, if that is the one of before, on a board that knows where the machine is.
-    pub(super) fn rest<R: Root, const N: usize, const M: usize>(
+    pub(super) fn rest<const N: usize, const M: usize>(
         &self,
         machine: &Machine<N>,
         program: &Program,
@@ -203,7 +202,8 @@ impl Resumed {
         self.require_place(machine, connection)?;
         let item = job.item_behind(record.driven);
         let name = record.program.display().to_string();
-        let rest = job.from_item::<R>(item).map_err(|problem| PlanningError::at_line(&name, problem))?;
+        let rest = in_numbers!(connection.numbers(), R => job.from_item::<R>(item));
+        let rest = rest.map_err(|problem| PlanningError::at_line(&name, problem))?;
         let begins =
             rest.line_of(0).map_or_else(|| "behind the path".to_owned(), |line| format!("at line {line}"));
         let place = format!("{name} was interrupted in line {}: goes on {begins}", record.line);
