@@ -10,6 +10,8 @@ use motion_host::machine::Machine;
 use motion_host::planning::{Item, Mode, Plan, Stretch, plan_program};
 use serde_json::Value;
 
+use crate::cli::workspace::Workspace;
+
 fn samples() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/programs")
 }
@@ -131,6 +133,22 @@ fn the_least_time_is_that_of_small_steps() {
     }
 }
 
+/// A kink that is passed steps velocity by the angle; a path without one does not.
+#[test]
+fn a_kink_that_is_passed_is_told() {
+    let workspace = Workspace::new("compare-kink");
+    let of = |second: &str| {
+        let text = format!("G61 G21 G90 F3000\nG1 X20\n{second}\nM2\n");
+        workspace.put("kink.ngc", &text);
+        let found = workspace.json(&["compare", "kink.ngc", "--json"]);
+        found["rows"][0]["velocity_step_mm_s"].as_f64().expect("a number")
+    };
+    let (kinked, straight) = (of("X40 Y0.08"), of("X40"));
+    let step_mm_s = 50.0 * 0.004;
+    println!("{kinked} mm/s, expected {step_mm_s}; without a kink {straight}");
+    assert!((kinked - step_mm_s).abs() < 1e-3 * step_mm_s && straight < 1e-6);
+}
+
 #[test]
 fn the_forms_say_the_same() {
     let asked = ["pockets.ngc", "--tolerance", "0.1"];
@@ -141,7 +159,7 @@ fn the_forms_say_the_same() {
     assert_eq!(
         lines[0],
         "program,path,blocks,blends,length_mm,time_s,per_block_s,least_s,tolerance_share,feed_ratio,accel_ratio,jerk_ratio,\
-         accel_step_ratio,acceleration_s"
+         accel_step_ratio,acceleration_s,velocity_step_mm_s"
     );
     assert_eq!(lines.len(), 3);
     let table = String::from_utf8(compared(&asked).stdout).expect("UTF-8");

@@ -27,8 +27,8 @@ published plan, whatever the machine's law is; `least` is the time on the same p
 snap along it, but under the ceilings that they make, a lower bound for every plan; `accel. alone` is the time
 on it under programmed feeds and acceleration alone; `tolerance` is the greatest share of the tolerance that the
 path uses; `feed` to `step` are the executed ticks over the limits of axes and path, `step` for the acceleration
-step at a junction without a blend. Refused
-programs are listed; then the exit status is 2.";
+step at a junction without a blend; `velocity step` is the most that a kink steps that is passed, in one tick.
+Refused programs are listed; then the exit status is 2.";
 
 /// Compare the times of programs: exact path, blends, plan per block, and the least possible.
 #[derive(Debug, Args)]
@@ -76,6 +76,7 @@ struct Row {
     jerk_ratio: f64,
     accel_step_ratio: f64,
     acceleration_s: f64,
+    velocity_step_mm_s: f64,
 }
 
 impl Row {
@@ -97,6 +98,7 @@ impl Row {
             jerk_ratio: ratios.jerk,
             accel_step_ratio: ratios.accel_step,
             acceleration_s,
+            velocity_step_mm_s: ratios.velocity_step_mm_s,
         }
     }
 }
@@ -226,6 +228,7 @@ fn write_table(rows: &[Row], out: &mut dyn Write) -> io::Result<()> {
         percent("accel. [%]", |row| row.accel_ratio),
         percent("jerk [%]", |row| row.jerk_ratio),
         percent("step [%]", |row| row.accel_step_ratio),
+        value("velocity step [mm/s]", &|row| format!("{:.3}", row.velocity_step_mm_s)),
     ];
     table::write(&columns, &lines, out)
 }

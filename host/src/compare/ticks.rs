@@ -17,7 +17,7 @@ use crate::toolpath::{Vector, norm, subtract};
 /// Places in either stream.
 const QUEUED: usize = 64;
 
-/// The greatest of each over all ticks, over its limit: at most 1 but for rounding.
+/// The greatest of each over all ticks, over its limit, where there is one: at most 1 but for rounding.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ratios {
     /// Velocity of an axis.
@@ -29,6 +29,9 @@ pub struct Ratios {
     /// Change of the acceleration vector from one tick to the next, beyond what jerk accounts for, over the
     /// acceleration-step limit.
     pub accel_step: f64,
+    /// Change of the velocity vector from one tick to the next, beyond what the set accelerations of both account for, of the
+    /// linear axes \[mm/s\]: what a kink steps that is passed. Where acceleration steps, half of that times the tick is in it.
+    pub velocity_step_mm_s: f64,
 }
 
 /// Why a plan could not be executed.
@@ -62,7 +65,7 @@ pub fn ratios<const N: usize>(plan: &Plan<N>, machine: &Machine<N>) -> Result<Ra
     let linear = |vector: Vector<N>| -> Vector<N> {
         core::array::from_fn(|axis| if is_linear[axis] { vector[axis] } else { 0.0 })
     };
-    let (mut ratios, mut last_accel) = (Ratios::default(), [0.0; N]);
+    let (mut ratios, mut last_accel, mut last_velocity) = (Ratios::default(), [0.0; N], [0.0; N]);
     loop {
         supply.fill(&mut feeder).map_err(TicksError::Rejected)?;
         let executed = executor.tick(&mut intake).map_err(|fault| TicksError::Fault(format!("{fault:?}")))?;
@@ -77,7 +80,13 @@ pub fn ratios<const N: usize>(plan: &Plan<N>, machine: &Machine<N>) -> Result<Ra
         ratios.jerk = ratios.jerk.max(norm(linear(jerk)) / path.jerk_mm_s3);
         let step = norm(subtract(accel, last_accel)) - jerk_mm_s3 * plan.tick_s;
         ratios.accel_step = ratios.accel_step.max(step / path.accel_step_mm_s2);
-        last_accel = accel;
+        let velocity = executed.setpoints.map(|set| set.velocity_mm_s);
+        let stepped = core::array::from_fn(|axis| {
+            let by_accel = (accel[axis] + last_accel[axis]) / 2.0 * plan.tick_s;
+            velocity[axis] - last_velocity[axis] - by_accel
+        });
+        ratios.velocity_step_mm_s = ratios.velocity_step_mm_s.max(norm(linear(stepped)));
+        (last_accel, last_velocity) = (accel, velocity);
         match executed.state {
             ExecState::Idle if supply.is_empty() => return Ok(ratios),
             ExecState::Stopped => executor.resume(),
