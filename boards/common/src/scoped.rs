@@ -16,7 +16,7 @@ use motion_kernel::link::{BoardLink, Event, FRAME_MAX, HostLink, Mode, State, St
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::program::Item;
 use motion_kernel::queue::LiveStreams;
-use motion_kernel::scope::{Replay, ReplayError, ScopeMemory, Told};
+use motion_kernel::scope::{BODY_MAX, Replay, ReplayError, ScopeMemory, Told};
 use motion_kernel::trace::{Digest, Trace};
 use motion_kernel::units::{Counts, DacCode, Position};
 
@@ -115,6 +115,40 @@ impl DriveEnable<AXES> for Bench {
 
 impl Outputs for Bench {
     fn switch(&mut self, _: &OutputState) {}
+}
+
+/// Faults before ticks that nobody has read do not stand in the way of those behind a snapshot.
+#[test]
+fn faults_before_dropped_ticks_are_dropped() {
+    let machine = machine();
+    let header = *machine.header();
+    let mut flight = FlightRecorder::<f32, AXES, 16, 8>::new();
+    let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
+    let (feeder, intake) = streams.split(header.rules, header.start);
+    let mut memory = ScopeMemory::<f32, AXES, 16>::new();
+    let (recorder, mut scope, log) = memory.split(&feeder);
+    let kernel = Kernel::new(&machine.axes, header.start, [Counts(0); AXES]);
+    let mut control = Control::new(kernel, intake, &mut flight);
+    control.set_recorder(recorder);
+    scope.obey(Some((1, 0)), log);
+    let mut bench = Bench::new();
+    for round in 0..3 {
+        // Twice as many ticks as have room, and more faults before them than do.
+        for tick in 0..80 {
+            control.tick((tick % 2 == 0).then_some(FaultKind::TickOverrun), None, &mut bench);
+        }
+        assert!(scope.is_snapshot_due(log), "round {round}");
+        let Control { kernel, intake, recorder: Some(recorder), .. } = &mut control else {
+            panic!("there is one")
+        };
+        scope.take_snapshot(kernel, intake, recorder, log);
+        for tick in 0..8 {
+            control.tick((tick % 2 == 0).then_some(FaultKind::TickOverrun), None, &mut bench);
+        }
+        let mut body = [0; BODY_MAX];
+        while scope.body(log, &mut body).is_some() {}
+        assert!(!scope.is_snapshot_due(log), "round {round}");
+    }
 }
 
 /// What a run is.

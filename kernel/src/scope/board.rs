@@ -138,7 +138,7 @@ impl<'a, R: Real, const AXES: usize> BoardScope<'a, R, AXES> {
         log: &mut Log<AXES>,
     ) {
         log.clear();
-        self.ticks.clear();
+        self.drop_ticks();
         let Trace { tick, axes, inputs, .. } = kernel.trace();
         let counts = axes.each_ref().map(|axis| axis.counts.0 as u32);
         self.expected = Expected::after(counts, inputs);
@@ -148,7 +148,7 @@ impl<'a, R: Real, const AXES: usize> BoardScope<'a, R, AXES> {
         (self.is_snapshot_due, self.trips_sent) = (false, 0);
     }
 
-    /// Drops all ticks that wait.
+    /// Drops all ticks that wait, and the faults before them.
     fn drop_ticks(&mut self) {
         self.ticks.clear();
         // Bounded: no tick brings more than a few.
