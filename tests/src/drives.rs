@@ -7,11 +7,15 @@ use hal_sim::{
     AxisParameters, BedMode, DriveParameters, EncoderNoise, EncoderParameters, REFERENCE_ENCODER,
     REFERENCE_MM_S_PER_VOLT, REFERENCE_SUBSTEPS, REFERENCE_TICK_S, SimAxis,
 };
+use motion_host::drive::DriveError;
+use motion_host::drive::circle::{CircleFigures, figures};
+use motion_host::drive::verification::{Verdict, bears_mm_s2, circle};
+use motion_host::gcode::Plane;
 use motion_host::identify::{
     AxisParametersFound, AxisRecording, Estimate, Excitation, Identification, explore, identify,
 };
 use motion_host::machine::Machine;
-use motion_host::tuning::{Margins, Method, propose};
+use motion_host::tuning::{AxisTuning, Margins, Method, propose};
 use motion_kernel::units::DacCode;
 
 use crate::random::Random;
@@ -21,6 +25,13 @@ const LINE: usize = 512;
 
 /// What the drives reach through their converters \[mm/s\].
 const FASTEST_MM_S: f64 = 10.0 * REFERENCE_MM_S_PER_VOLT;
+
+/// Half-widths that nothing may be off by.
+pub const HALF_WIDTHS_MAX: f64 = 4.0;
+/// The mass ratio up to which a bed may be missed: it moves the axis by less than recordings tell.
+pub const MISSED_RATIO_MAX: f64 = 0.012;
+/// What margins may be off by, as a part of the true ones.
+pub const MARGINS_OFF_MAX: f64 = 0.02;
 
 /// An axis that was drawn.
 #[derive(Clone, Copy, Debug)]
@@ -166,6 +177,8 @@ pub struct Surveyed {
     /// The margins of the loop that is proposed: as they are claimed, and those of the drive as it is. Without, tuning
     /// was refused.
     pub margins: Option<[Margins; 2]>,
+    /// Circles before and after tuning; none without a tuning.
+    pub circles: Circles,
     /// Time that it took \[s\]: of the processor, where the system tells it.
     pub time_s: f64,
 }
@@ -187,14 +200,53 @@ impl Surveyed {
             (None, true) => ", a bed that is not there".to_owned(),
             _ => String::new(),
         };
+        let wrong: Vec<String> = self.wrong().into_iter().chain(self.circles.not_driven.clone()).collect();
+        let wrong = if wrong.is_empty() { String::new() } else { format!(" ({})", wrong.join("; ")) };
         let met = if self.is_met { "" } else { ", says that the model does not follow" };
-        format!("seed {seed}: half-widths off: {worst}{bed}{met}, {:.1} s", self.time_s)
+        format!("seed {seed}: half-widths off: {worst}{bed}{met}, {:.1} s{wrong}", self.time_s)
+    }
+
+    /// What may not be.
+    #[must_use]
+    pub fn wrong(&self) -> Vec<String> {
+        let found = self.found.iter().flatten();
+        let off = found.filter(|one| !(one.half_widths_off() <= HALF_WIDTHS_MAX));
+        let mut wrong: Vec<String> =
+            off.map(|one| format!("{} off by {:.1} half-widths", one.name, one.half_widths_off())).collect();
+        if self.found.is_ok() {
+            match (self.axis.drive.bed, self.has_bed) {
+                (Some(bed), false) if bed.mass_ratio > MISSED_RATIO_MAX => {
+                    wrong.push(format!("bed missed at a mass ratio of {:.3}", bed.mass_ratio));
+                }
+                (None, true) => wrong.push("a bed that is not there".to_owned()),
+                _ => {}
+            }
+        }
+        let margins_off = self.margins.as_ref().map_or(0.0, margins_off);
+        if !(margins_off <= MARGINS_OFF_MAX) {
+            wrong.push(format!("margins off by {:.1} %", 100.0 * margins_off));
+        }
+        wrong.extend(self.circles.worse.iter().cloned());
+        wrong
     }
 }
 
-/// The drive of a seed, recorded and identified.
+/// Circles of a drive, before and after tuning.
+#[derive(Clone, Debug, Default)]
+pub struct Circles {
+    /// Driven both before and after.
+    pub driven: usize,
+    /// Not driven before, with the published machine's gains, but after.
+    pub gained: usize,
+    /// Driven neither before nor after: why.
+    pub not_driven: Vec<String>,
+    /// Worse after tuning.
+    pub worse: Vec<String>,
+}
+
+/// The drive of a seed, recorded, identified, tuned, and driven round circles of these frequencies \[Hz\].
 #[must_use]
-pub fn surveyed(seed: u64) -> Surveyed {
+pub fn surveyed(seed: u64, circles_hz: &[f64]) -> Surveyed {
     let axis = RandomAxis::new(seed);
     let mut run = 0;
     let runs = explore(REFERENCE_TICK_S, FASTEST_MM_S, |excitation| {
@@ -207,20 +259,66 @@ pub fn surveyed(seed: u64) -> Surveyed {
     let time_s = processor_s() - start_s;
     let has_bed = found.as_ref().is_ok_and(|found| found.parameters.bed.is_some());
     let is_met = found.as_ref().is_ok_and(Identification::is_met);
-    let margins = found.as_ref().ok().and_then(|found| margins(&axis, found));
+    let tuned = found.as_ref().ok().and_then(|found| Some((found, tuning(&axis, found)?)));
+    let margins = tuned.as_ref().map(|(_, tuning)| {
+        [tuning.margins, Margins::of(&axis.drive, tuning.gains.kp_per_s, REFERENCE_TICK_S)]
+    });
+    let circles =
+        tuned.map_or_else(Circles::default, |(found, tuning)| circles(&axis, found, &tuning, circles_hz));
     let found = match found {
         Ok(found) => Ok(compared(&axis, &found.parameters)),
         Err(error) => Err(error.to_string()),
     };
-    Surveyed { axis, found, has_bed, is_met, margins, time_s }
+    Surveyed { axis, found, has_bed, is_met, margins, circles, time_s }
 }
 
-/// The proposed loop's margins in the drive that was found, and in the true one.
-fn margins(axis: &RandomAxis, found: &Identification) -> Option<[Margins; 2]> {
-    let mut settings = Machine::reference().axes[0].clone();
-    settings.mm_per_count = axis.encoder.resolution_mm;
-    let tuning = propose(&settings, found, Method::Inverse, REFERENCE_TICK_S).ok()?;
-    Some([tuning.margins, Margins::of(&axis.drive, tuning.gains.kp_per_s, REFERENCE_TICK_S)])
+/// The published machine with this axis as X.
+fn machine(axis: &RandomAxis) -> Machine {
+    let mut machine = Machine::reference();
+    let x = &mut machine.axes[0];
+    (x.drive, x.mm_per_count, x.noise) = (axis.drive, axis.encoder.resolution_mm, axis.encoder.noise);
+    machine
+}
+
+/// What is proposed for the drive that was found.
+fn tuning(axis: &RandomAxis, found: &Identification) -> Option<AxisTuning> {
+    propose(&machine(axis).axes[0], found, Method::Inverse, REFERENCE_TICK_S).ok()
+}
+
+/// The circles that `motion drive tune` drives, with the published gains and with those that are proposed.
+fn circles(axis: &RandomAxis, found: &Identification, tuning: &AxisTuning, circles_hz: &[f64]) -> Circles {
+    let before = machine(axis);
+    let mut after = before.clone();
+    let x = &mut after.axes[0];
+    (x.gains, x.feedforward, x.output_offset_v) = (tuning.gains, tuning.feedforward, tuning.output_offset_v);
+    let verdict = Verdict { machine: &after, is_tuned: [true, false] };
+    let mut circles = Circles::default();
+    for &frequency_hz in circles_hz {
+        let bears_mm_s2 = bears_mm_s2(found).unwrap_or(f64::INFINITY);
+        let (circle, _) = circle(Plane::Xy, frequency_hz, &before, bears_mm_s2);
+        let drive = |machine: &Machine| -> Result<CircleFigures, DriveError> {
+            figures(&circle.record(machine)?, &circle)
+        };
+        match (drive(&before), drive(&after)) {
+            (Ok(before), Ok(after)) => {
+                circles.driven += 1;
+                if !verdict.is_no_worse(&before, &after) {
+                    let [was_um, is_um] = [&before, &after].map(|figures| verdict.judged_um(figures));
+                    let worse =
+                        format!("the circle at {frequency_hz} Hz got worse, {was_um:.2} to {is_um:.2} µm");
+                    circles.worse.push(worse);
+                }
+            }
+            (Err(_), Ok(_)) => circles.gained += 1,
+            (Ok(_), Err(error)) => {
+                circles.worse.push(format!("the circle at {frequency_hz} Hz is lost: {error}"));
+            }
+            (Err(_), Err(error)) => {
+                circles.not_driven.push(format!("no circle at {frequency_hz} Hz: {error}"));
+            }
+        }
+    }
+    circles
 }
 
 /// By how much phase and gain margin are off, as a part of the true ones.
@@ -281,8 +379,16 @@ pub fn report(all: &[Surveyed]) -> String {
     let worst_part = 100.0 * margins.iter().copied().fold(0.0, f64::max);
     line(format!(
         "| margins off by over 2 % (at most {worst_part:.2} %) | {} |",
-        margins.iter().filter(|off| !(**off <= 0.02)).count()
+        margins.iter().filter(|off| !(**off <= MARGINS_OFF_MAX)).count()
     ));
+    let circles = |of: fn(&Circles) -> usize| all.iter().map(|one| of(&one.circles)).sum::<usize>();
+    line(String::new());
+    line("| circles of tuned drives, within their limits | number |".to_owned());
+    line("|---|---:|".to_owned());
+    line(format!("| driven before and after | {} |", circles(|one| one.driven)));
+    line(format!("| driven after tuning only | {} |", circles(|one| one.gained)));
+    line(format!("| driven neither before nor after | {} |", circles(|one| one.not_driven.len())));
+    line(format!("| worse, or lost | {} |", circles(|one| one.worse.len())));
     line(format!(
         "\nProcessor time of an identification: median {:.1} s, 95 % below {:.1} s, at most {:.1} s.\n",
         at(0.5),
@@ -306,14 +412,16 @@ pub fn report(all: &[Surveyed]) -> String {
             off.extend(of_name.map(|compared| (compared.half_widths_off(), one.axis.seed)));
         }
         let within = off.iter().filter(|(off, _)| *off <= 1.0).count();
-        let beyond = off.iter().filter(|(off, _)| !(*off <= 4.0)).count();
+        let beyond = off.iter().filter(|(off, _)| !(*off <= HALF_WIDTHS_MAX)).count();
         let (worst, seed) = off.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, 0));
         let share = 100.0 * within as f64 / off.len().max(1) as f64;
         line(format!("| `{name}` | {} | {share:.1} % | {beyond} | {worst:.1} | {seed} |", off.len()));
     }
     line(String::new());
-    let is_off = |one: &Surveyed| one.found.iter().flatten().any(|one| !(one.half_widths_off() <= 4.0));
-    let is_right = |one: &Surveyed| one.is_met && one.has_bed == one.axis.drive.bed.is_some() && !is_off(one);
+    let is_right = |one: &Surveyed| {
+        let is_found = one.is_met && one.has_bed == one.axis.drive.bed.is_some();
+        is_found && one.wrong().is_empty() && one.circles.not_driven.is_empty()
+    };
     for one in all.iter().filter(|one| !is_right(one)) {
         line(format!("- {}", one.words()));
     }

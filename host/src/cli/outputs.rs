@@ -29,7 +29,7 @@ pub(super) fn open(
 #[derive(Debug, Default)]
 pub(super) struct Written {
     files: Vec<(&'static str, String)>,
-    failures: Vec<FilesError>,
+    failures: Vec<(&'static str, FilesError)>,
     /// The trace has no tick: what it was to begin with has not come.
     has_no_tick: bool,
     /// Why a trace did not get to standard output.
@@ -54,13 +54,18 @@ impl Written {
     pub(super) fn add(&mut self, what: &'static str, name: String, done: Result<(), FilesError>) {
         match done {
             Ok(()) => self.files.push((what, name)),
-            Err(failure) => self.failures.push(failure),
+            Err(failure) => self.failures.push((what, failure)),
         }
     }
 
     /// The path of the file, if it was written.
     pub(super) fn place_of(&self, what: &str) -> Option<&str> {
         self.files.iter().find(|(of, _)| *of == what).map(|(_, name)| name.as_str())
+    }
+
+    /// Why the file was not written, if it should have been.
+    pub(super) fn failure_of(&self, what: &str) -> Option<String> {
+        self.failures.iter().find(|(of, _)| *of == what).map(|(_, failure)| failure.to_string())
     }
 
     /// Says where files were written.
@@ -78,7 +83,7 @@ impl Written {
     /// The command's outcome, unless a file was not written.
     pub(super) fn outcome(self, outcome: Outcome) -> Result<Outcome, CliError> {
         let printed = self.printed.map(|failure| Err(CliError::Output(failure)));
-        let failures = self.failures.into_iter().map(|failure| Err(CliError::Unwritten(failure)));
+        let failures = self.failures.into_iter().map(|(_, failure)| Err(CliError::Unwritten(failure)));
         CliError::all(printed.into_iter().chain(failures).chain([Ok(outcome)]))
     }
 }

@@ -8,13 +8,17 @@
 //! at most √left standard deviations for a remainder of `left` (Cauchy and Schwarz), and intervals become as much
 //! wider.
 //!
+//! Drives work in steps of their own, and so does the model. Along the direction that the recordings fix worst, positions
+//! hardly change over many steps of the drive but go up and down within each, and a derivative sees only this. So the
+//! weakest directions are looked at over a standard deviation instead: what little changes over that is what tells.
+//!
 //! Intervals of what is made from several unknowns, and of what has a bound, are not those of a parabola. So
 //! samples are drawn from the covariance, cut to the bounds, and the interval is what holds 95 of 100.
 
 use super::Estimate;
 use super::cholesky::{Lower, Symmetric};
 use super::parameters::{Unknown, Unknowns};
-use super::readings::{Precision, Runs, dot};
+use super::readings::{Precision, Residuals, Runs, Weights, dot};
 use super::search::{Found, derivatives};
 
 /// Lags over which autocorrelation is summed at most.
@@ -25,6 +29,12 @@ const NOT_WHITE: f64 = 1.35;
 
 /// Powers of the inverse for its greatest direction.
 const POWERS: usize = 12;
+
+/// Weakest directions that are looked at over a standard deviation, and how often each: it grows.
+const WIDE_DIRECTIONS: usize = 3;
+const WIDE_ROUNDS: usize = 3;
+/// Part of the change that derivatives promise, from which they are believed.
+const PROMISED: f64 = 0.9;
 
 /// Samples that intervals are read from: their ends are good to a thirtieth.
 const SAMPLES: usize = 2000;
@@ -72,9 +82,10 @@ pub(super) fn confidence(
     let mut samples = Vec::new();
     let mut least_misfit = f64::INFINITY;
     for centre in [found.unknowns].iter().chain(&found.rivals) {
-        let (columns, residuals) = derivatives(runs, centre, free, substeps)?;
+        let (mut columns, residuals) = derivatives(runs, centre, free, substeps)?;
         let misfit: f64 = weights.misfits(&residuals).iter().sum();
         least_misfit = least_misfit.min(misfit);
+        widen(runs, &weights, centre, free, substeps, &mut columns, &residuals);
         let mut information = weights.sums(&columns, &residuals).normal;
         for (index, unknown) in free.iter().enumerate() {
             // An unknown that no run shows ends with this width, far beyond what counts as determined.
@@ -101,31 +112,129 @@ pub(super) fn confidence(
 /// unknowns.
 pub(super) fn floor(runs: &Runs, found: &Found, free: &[Unknown], substeps: u32) -> Option<Vec<f64>> {
     let (columns, residuals) = derivatives(runs, &found.unknowns, free, substeps)?;
-    let mut information = runs.weights(Precision::LAST).sums(&columns, &residuals).normal;
-    // What no run shows has no floor.
-    for (index, unknown) in free.iter().enumerate() {
-        let least = unknown.ignorance().powi(-2);
-        if information.at(index, index) < least {
-            *information.at_mut(index, index) = 1e12 * least;
+    let information = runs.weights(Precision::LAST).sums(&columns, &residuals).normal;
+    Some(weakest(&Shown::of(information, free), &[])?.0)
+}
+
+/// The information of the unknowns that some run shows; the others are held.
+struct Shown {
+    scaled: Symmetric,
+    scale: Vec<f64>,
+}
+
+impl Shown {
+    fn of(mut information: Symmetric, free: &[Unknown]) -> Self {
+        for (index, unknown) in free.iter().enumerate() {
+            let least = unknown.ignorance().powi(-2);
+            if information.at(index, index) < least {
+                *information.at_mut(index, index) = 1e12 * least;
+            }
         }
-    }
-    let scale: Vec<f64> = (0..free.len()).map(|index| information.at(index, index).sqrt().recip()).collect();
-    let mut scaled = Symmetric::zero(free.len());
-    for row in 0..free.len() {
-        for column in 0..free.len() {
-            *scaled.at_mut(row, column) = information.at(row, column) * scale[row] * scale[column];
+        let scale: Vec<f64> =
+            (0..free.len()).map(|index| information.at(index, index).sqrt().recip()).collect();
+        let mut scaled = Symmetric::zero(free.len());
+        for row in 0..free.len() {
+            for column in 0..free.len() {
+                *scaled.at_mut(row, column) = information.at(row, column) * scale[row] * scale[column];
+            }
+            *scaled.at_mut(row, row) *= 1.0 + 1e-12;
         }
-        *scaled.at_mut(row, row) *= 1.0 + 1e-12;
+        Self { scaled, scale }
     }
+}
+
+/// One standard deviation along the worst direction of those at right angles to the `known` ones, in the coordinates of
+/// the unknowns, and its unit vector among the scaled ones.
+fn weakest(Shown { scaled, scale }: &Shown, known: &[Vec<f64>]) -> Option<(Vec<f64>, Vec<f64>)> {
     // Powers of the inverse turn any vector into its greatest direction.
-    let mut direction = vec![1.0; free.len()];
+    let mut direction: Vec<f64> = (0..scale.len()).map(|index| 1.0 + 0.1 * index as f64).collect();
     let mut length = 1.0;
     for _ in 0..POWERS {
         direction = scaled.solve(&direction)?;
+        for known in known {
+            let share = dot(known, &direction);
+            direction.iter_mut().zip(known).for_each(|(part, known)| *part -= share * known);
+        }
         length = dot(&direction, &direction).sqrt();
         direction.iter_mut().for_each(|part| *part /= length);
     }
-    Some(direction.iter().zip(&scale).map(|(part, scale)| part * scale * length.sqrt()).collect())
+    let step = direction.iter().zip(scale).map(|(part, scale)| part * scale * length.sqrt()).collect();
+    Some((step, direction))
+}
+
+/// Gives `columns` the change over a standard deviation along the weakest directions, where it is less than the
+/// derivatives promise.
+fn widen(
+    runs: &Runs,
+    weights: &Weights,
+    centre: &Unknowns,
+    free: &[Unknown],
+    substeps: u32,
+    columns: &mut [Residuals],
+    still: &Residuals,
+) {
+    let mut known: Vec<Vec<f64>> = Vec::new();
+    for _ in 0..WIDE_DIRECTIONS.min(free.len()) {
+        for round in 1..=WIDE_ROUNDS {
+            let shown = Shown::of(weights.sums(columns, still).normal, free);
+            let Some((step, direction)) = weakest(&shown, &known) else { return };
+            let wide = wide_change(runs, centre, free, substeps, &step, still);
+            let is_less =
+                |change: &Residuals| weights.misfits(change).iter().sum::<f64>() < PROMISED * PROMISED;
+            let Some(mut change) = wide.filter(is_less) else {
+                known.push(direction);
+                break;
+            };
+            for (column, by) in columns.iter().zip(&step) {
+                add(&mut change, column, -by);
+            }
+            // The change along the step becomes what was seen; at right angles to it all stays.
+            let scaled: Vec<f64> = step.iter().zip(&shown.scale).map(|(by, scale)| by / scale).collect();
+            let squares = dot(&scaled, &scaled);
+            for (column, (by, scale)) in columns.iter_mut().zip(scaled.iter().zip(&shown.scale)) {
+                add(column, &change, by / scale / squares);
+            }
+            if round == WIDE_ROUNDS {
+                known.push(direction);
+            }
+        }
+    }
+}
+
+/// What residuals change by over `step`: half of what they do over a step to either side, where bounds allow both.
+fn wide_change(
+    runs: &Runs,
+    centre: &Unknowns,
+    free: &[Unknown],
+    substeps: u32,
+    step: &[f64],
+    still: &Residuals,
+) -> Option<Residuals> {
+    let lag_limit_s = runs.lag_limit_s();
+    let side = |sign: f64| {
+        let steps = free.iter().zip(step);
+        let moved = steps.fold(*centre, |moved, (&unknown, step)| moved.shifted(unknown, sign * step));
+        (moved == moved.bounded(free, lag_limit_s)).then_some(moved)
+    };
+    let sides = [side(1.0), side(-1.0)];
+    let sets: Vec<Unknowns> = sides.iter().flatten().copied().collect();
+    let mut found = runs.residuals(&sets, substeps).into_iter();
+    let mut of = |side: Option<Unknowns>| match side {
+        Some(_) => found.next()?,
+        None => Some(still.clone()),
+    };
+    let (mut change, less) = (of(sides[0])?, of(sides[1])?);
+    add(&mut change, &less, -1.0);
+    let per_step = 1.0 / sets.len() as f64;
+    change.iter_mut().flatten().for_each(|value| *value *= per_step);
+    (!sets.is_empty()).then_some(change)
+}
+
+/// `sum` + `by`·`other`.
+fn add(sum: &mut Residuals, other: &Residuals, by: f64) {
+    for (sum, other) in sum.iter_mut().zip(other) {
+        sum.iter_mut().zip(other).for_each(|(sum, other)| *sum += by * other);
+    }
 }
 
 /// A factor of the inverse: L⁻ᵀ scaled, so that L⁻ᵀ·(normal numbers) have the covariance.

@@ -60,6 +60,8 @@ const EXCHANGED_EFFORT: Effort = Effort { precision: Precision::LAST, jacobians:
 /// which chance prefers in one of a hundred cases.
 const NEAR: f64 = 3e4;
 const RIVAL: f64 = 9.0;
+/// Misfit for each reading beyond which a model has no valley worth looking beside.
+const LOST: f64 = 100.0;
 /// Kicks along the floor, in standard deviations, and the gain in misfit for which what follows is searched.
 const KICKS: [f64; 4] = [-30.0, -9.0, 9.0, 30.0];
 const KICKED_EFFORT: Effort = Effort { precision: Precision::LAST, jacobians: 2, least_gain: 10.0 };
@@ -127,6 +129,9 @@ impl Stages {
     fn last(&self, start: Unknowns, free: &[Unknown]) -> Option<Found> {
         let fine = self.stage(start, free, FINE_EFFORT)?;
         let found = search(&self.runs, fine.unknowns, free, LAST_EFFORT)?;
+        if found.misfit() > LOST * self.readings() {
+            return Some(found);
+        }
         self.kicked(self.with_rivals(found, free)?, free)
     }
 

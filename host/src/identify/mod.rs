@@ -1,7 +1,7 @@
 //! Identification: the parameters of a servo axis, from recordings of outputs and encoder readings.
 //!
 //! Consumes [`AxisRecording`]s of the motions that [`explore`] asks for, or of any others that start at rest, from an
-//! open or a closed loop; produces an [`Identification`]. Runs in the background of the PC, in two to five seconds
+//! open or a closed loop; produces an [`Identification`]. Runs in the background of the PC, in one to seven seconds
 //! of processor time for ten seconds of recordings. It never sees the parameters of a simulation: a machine
 //! gives the same two columns.
 //!
@@ -54,6 +54,7 @@ mod step_reading;
 mod harmonic_reading;
 mod parameters;
 mod simulation;
+mod whole_ticks;
 mod cholesky;
 mod moments;
 mod readings;

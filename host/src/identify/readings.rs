@@ -15,7 +15,7 @@ use super::cholesky::{Lower, Symmetric};
 use super::moments::Motion;
 use super::parameters::Unknowns;
 use super::recording::{AxisRecording, span};
-use super::simulation::{LANES, SUBSTEPS, simulate};
+use super::simulation::{LANES, SUBSTEPS, Simulation};
 
 /// The longest lag that is looked for \[ticks\].
 const LAG_TICKS_MAX: f64 = 50.0;
@@ -233,12 +233,11 @@ impl Runs {
     /// Groups the readings anew by the motion of the model, and takes over its moments.
     pub(super) fn regroup(&mut self, unknowns: &Unknowns, substeps: u32) {
         let (resolution_mm, tick_s) = (self.resolution_mm, self.tick_s);
+        let simulation = Simulation::new(&[*unknowns; LANES], tick_s, substeps);
         for index in 0..self.runs.len() {
             let mut positions = Vec::with_capacity(self.raw[index].len());
             let command = &self.runs[index].command_mm_s;
-            let limited = simulate(command, tick_s, substeps, &[*unknowns; LANES], &mut |_, at| {
-                positions.push(at[0]);
-            });
+            let limited = simulation.run(command, &mut |_, at| positions.push(at[0]));
             let motion =
                 Motion { command_mm_s: command, positions_mm: &positions, limited: &limited, tick_s };
             let moments = motion.offsets(unknowns);
@@ -293,11 +292,12 @@ impl Runs {
 
     fn residuals_of_lanes(&self, sets: &[Unknowns], substeps: u32) -> Vec<Option<Residuals>> {
         let lanes: [Unknowns; LANES] = core::array::from_fn(|lane| sets[lane.min(sets.len() - 1)]);
+        let simulation = Simulation::new(&lanes, self.tick_s, substeps);
         let mut all = vec![Vec::with_capacity(self.runs.len()); sets.len()];
         for run in &self.runs {
             let mut sums = vec![[0.0; LANES]; run.actual_mm.len()];
             let mut group = 0;
-            simulate(&run.command_mm_s, self.tick_s, substeps, &lanes, &mut |tick, at| {
+            simulation.run(&run.command_mm_s, &mut |tick, at| {
                 if tick < run.starts[0] {
                     return;
                 }

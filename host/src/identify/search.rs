@@ -43,6 +43,8 @@ pub(super) struct Effort {
 
 /// Dampings that are tried at once, over the last that was good.
 const DAMPINGS: [f64; LANES] = [0.01, 1.0, 30.0, 1e3];
+/// A search also ends where it gains less than this part of the misfit: far from the readings the last digits tell nothing.
+const LEAST_PART: f64 = 1e-6;
 /// Steps with one Jacobian ...
 const STEPS_PER_JACOBIAN: usize = 5;
 /// ... while each gains this part of the misfit.
@@ -123,6 +125,7 @@ pub(super) fn search(runs: &Runs, start: Unknowns, free: &[Unknown], effort: Eff
             }
         }
         let gain = first - best.misfit();
+        let least_gain = least_gain.max(LEAST_PART * best.misfit());
         found = Some(best);
         if !(gain > least_gain) {
             break;

@@ -211,6 +211,7 @@ fn drive_tune_writes_what_it_has_verified() {
     let learning = &json["learning"];
     let robustness = learning["robustness"].as_array().expect("a list");
     assert_eq!(robustness.len(), 2);
+    assert!(learning["reason"].is_null(), "{learning}");
     for axis in robustness {
         assert_has(axis, &["axis", "contraction", "contraction_hz", "filter_corner_hz"]);
         assert!(number(&axis["contraction"]) < 1.0 && number(&axis["filter_corner_hz"]) > 50.0, "{axis}");
@@ -344,6 +345,51 @@ fn drive_tune_reports_its_refusal() {
     workspace.put("bad.csv", "time_s,command_v,counts\n0,0,0\n0.0005,0,what\n");
     workspace.refusal(&[&tune[..], &["bad.csv"]].concat());
     assert_eq!(workspace.read("r.html"), page);
+}
+
+/// Whatever was not done has its reason in the JSON.
+#[test]
+fn drive_tune_says_why_something_was_not_done() {
+    let workspace = Workspace::new("tune-not-done");
+    workspace.put("weak.toml", &as_strong(0.2));
+    workspace.put("slow.toml", &as_strong(0.1));
+    let tune = ["drive", "tune", "--axis", "X", "--json"];
+    let parsed = |json: &str| serde_json::from_str::<Value>(json).expect("JSON");
+    let learning_keys = ["best_repeat", "ended", "reason", "repeats", "robustness"];
+
+    // Its outputs do not reach the feed at which circles are learnt; what is verified is slower, and written.
+    let slow = ["--machine", "slow.toml", "--output", "t.toml", "--learn", "1"];
+    let more = ["--learn-output", "learnt.csv", "--report", "t.html"];
+    let (json, error) = workspace.ending(1, &[&tune[..], &slow, &more].concat());
+    let json = parsed(&json);
+    assert!(json["reason"].is_null() && json["output"] == "t.toml" && error.is_empty(), "{json} {error}");
+    assert_has(&json["learning"], &learning_keys);
+    let why = "no correction is learnt: found a feed of 2150 mm/min, expected at most ";
+    let reason = json["learning"]["reason"].as_str().expect("words");
+    assert!(reason.starts_with(why), "{reason}");
+    assert!(json["learning"]["repeats"].as_array().expect("a list").is_empty(), "{json}");
+    assert!(workspace.0.join("t.toml").exists() && !workspace.0.join("learnt.csv").exists());
+    assert!(workspace.read("t.html").contains(why));
+    let (said, _) =
+        workspace.ending(1, &["drive", "tune", "--axis", "X", "--machine", "slow.toml", "--learn", "1"]);
+    assert!(said.contains(why), "{said}");
+
+    // Beyond the current limit a correction makes it worse.
+    let weak = ["--machine", "weak.toml", "--learn", "1", "--learn-hz", "60"];
+    let json = workspace.json(&[&tune[..], &weak].concat());
+    assert_eq!(json["reason"], "--output was not given");
+    let learning = &json["learning"];
+    assert_has(learning, &learning_keys);
+    assert_eq!(learning["best_repeat"], 0, "{learning}");
+    assert_eq!(learning["reason"], "no correction was better than none; ended: all repeats made");
+
+    if std::path::Path::new("/dev/full").exists() {
+        let (json, error) = workspace.ending(6, &[&tune[..], &["--output", "/dev/full"]].concat());
+        let json = parsed(&json);
+        let reason = json["reason"].as_str().expect("words");
+        assert!(reason.starts_with("/dev/full: found ") && error.contains(reason), "{reason} {error}");
+        assert!(json["output"].is_null(), "{json}");
+    }
 }
 
 /// One axis alone is judged by its own error, in a plane that it moves in: beside an untuned one the contour

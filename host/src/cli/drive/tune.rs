@@ -16,6 +16,7 @@ use crate::cli::error::{CliError, Outcome};
 use crate::cli::outputs::{self, Written};
 use crate::cli::table::{self, Align};
 use crate::cli::write_json;
+use crate::drive::DriveError;
 use crate::drive::circle_motion::Circle;
 use crate::drive::identification::identify_axes;
 use crate::drive::learning::{LearningOptions, Learnt, Model, Reason, RepeatFigures, Robustness, learn};
@@ -50,8 +51,9 @@ JSON: axes: list of {name, found: {velocity_gain_per_s…: {value, half_width_95
 sensitivity}, changes: list of {key, before, after, unit, reason}, remarks}, verification: {feed_mm_min, circles: list of
 {axes, frequency_hz, feed_mm_min, before, after: {contour_error_um, form_deviation_um, following_error_first_um,
 following_error_second_um}}, not_driven: list of {axes, frequency_hz, feed_mm_min, reason}}, learning: null, or {repeats: list of {contour_error_um, following_error_um_rms of the three
-axes}, best_repeat, ended, robustness: list of {axis, filter_corner_hz, contraction, contraction_hz}}, output, reason (null
-if the machine file was written; else why not, also where nothing could be tuned).
+axes}, best_repeat, ended, robustness: list of {axis, filter_corner_hz, contraction, contraction_hz}, reason (null if a
+correction was learnt; else why not: then without repeats where it could not begin)}, output, reason (null if the machine
+file was written; else why not, also where nothing could be tuned).
 
 Circles stay within what the outputs reach and the current limit that was found bears: a circle that is driven slower
 than the others, or not at all, is in not_driven.
@@ -65,7 +67,8 @@ feedforward and linear between rows; CorrectedIntake::correct hands it to the ke
 better than none. Without this option the learnt correction is only shown.
 
 Exit status 1, and the machine file stays as it was: the tuned machine is worse on a circle than before, or the recordings
-do not determine the parameters that everything depends on (command gain, Kv, Ti, total delay).";
+do not determine the parameters that everything depends on (command gain, Kv, Ti, total delay). Exit status 1, too, where
+learning can't begin; a machine that is better without is written all the same.";
 
 /// Tune the simulated axes: identify them, propose gains and feedforward with reasons, verify them on
 /// circles.
@@ -177,7 +180,7 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     let mut written = Written::default();
     let is_better = reason.is_none();
     written.write("machine file", output.filter(|_| is_better), |file| file.write_all(work.text.as_bytes()));
-    if let (Some(learnt), None) = (&work.learnt, &failure) {
+    if let (Some(Ok(learnt)), None) = (&work.learnt, &failure) {
         written.write("correction", learn_output, |file| write_correction(&machine, learnt, file));
     }
     let place = written.place_of("machine file").map(str::to_owned);
@@ -197,12 +200,18 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     let Some(verification) = &work.verification else { return written.outcome(Outcome::Failed) };
     if arguments.json {
         let Ending { reason, place, .. } = ending;
-        let reason = reason.or_else(|| place.is_none().then(|| "--output was not given".to_owned()));
+        let unwritten =
+            || written.failure_of("machine file").unwrap_or_else(|| "--output was not given".to_owned());
+        let reason = reason.or_else(|| place.is_none().then(unwritten));
         write_json(&json(&machine, &work.tunings, verification, work.learnt.as_ref(), (place, reason)), out)?;
     } else {
         write_words(&machine, &work.tunings, verification, out).map_err(CliError::Output)?;
-        if let Some(learnt) = &work.learnt {
-            write_learnt(&machine, learnt, arguments.learn_hz, out).map_err(CliError::Output)?;
+        match &work.learnt {
+            Some(Ok(learnt)) => {
+                write_learnt(&machine, learnt, arguments.learn_hz, out).map_err(CliError::Output)?;
+            }
+            Some(Err(why)) => writeln!(out, "  {}\n", not_learnt(why)).map_err(CliError::Output)?,
+            None => {}
         }
         let end = match (&arguments.output, ending.reason) {
             (_, Some(worse)) => Some(format!("  no machine file is written: {worse}")),
@@ -212,7 +221,8 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
         end.map_or(Ok(()), |end| writeln!(out, "{end}")).map_err(CliError::Output)?;
         written.say(out)?;
     }
-    written.outcome(if is_better { Outcome::Done } else { Outcome::Failed })
+    let is_done = is_better && !matches!(work.learnt, Some(Err(_)));
+    written.outcome(if is_done { Outcome::Done } else { Outcome::Failed })
 }
 
 /// How tuning ended.
@@ -259,7 +269,8 @@ struct Work {
     /// The machine file with the new figures.
     text: String,
     verification: Option<Verification>,
-    learnt: Option<Learnt>,
+    /// What was learnt, or why learning could not begin: the machine is tuned all the same.
+    learnt: Option<Result<Learnt, DriveError>>,
 }
 
 impl Work {
@@ -290,7 +301,7 @@ impl Work {
         };
         let bears: Vec<Option<f64>> = self.found.iter().map(|(_, found)| bears_mm_s2(found)).collect();
         self.verification = Some(Verification::new(&before, &after, axes, &bears));
-        self.learnt = learning.map(|lesson| lesson.learn(&tuned, &self.tunings)).transpose()?;
+        self.learnt = learning.map(|lesson| lesson.learn(&tuned, &self.tunings));
         Ok(())
     }
 
@@ -303,7 +314,7 @@ impl Work {
             let tuned = self.tunings.iter().find(|tuned| tuned.axis == *axis);
             TunedAxis { axis: *axis, found, tuning: tuned.map(|tuned| &tuned.tuning) }
         });
-        let learnt = self.learnt.as_ref().map(|learnt| {
+        let of_learning = |learnt: &Learnt| {
             let row = |figures: &RepeatFigures| LearntRow {
                 contour_um: figures.contour_um,
                 rms_um: figures.rms_um,
@@ -315,6 +326,10 @@ impl Work {
             )];
             words.extend(robustness_in_words(machine, learnt));
             (learnt.repeats.iter().map(row).collect(), words)
+        };
+        let learnt = self.learnt.as_ref().map(|learnt| match learnt {
+            Ok(learnt) => of_learning(learnt),
+            Err(why) => (Vec::new(), vec![format!("{}.", not_learnt(why))]),
         });
         let words = [bold, &rest];
         let axes = axes.collect();
@@ -425,13 +440,13 @@ struct Lesson {
 impl Lesson {
     /// Learns on the tuned machine, with the identified drives; an axis that was not tuned is taken from the
     /// machine file.
-    fn learn(&self, tuned: &Machine, tunings: &[Tuned]) -> Result<Learnt, CliError> {
+    fn learn(&self, tuned: &Machine, tunings: &[Tuned]) -> Result<Learnt, DriveError> {
         let mut models = tuned.axes.each_ref().map(|axis| Model::from(axis.drive));
         for Tuned { axis, found, .. } in tunings {
             let command_gain = found.parameters.command_gain.value;
             models[*axis] = Model { drive: found.parameters.drive(), command_gain };
         }
-        Ok(learn(tuned, &self.circle, &models, &self.options)?)
+        learn(tuned, &self.circle, &models, &self.options)
     }
 }
 
@@ -497,6 +512,17 @@ fn robustness_in_words(machine: &Machine, learnt: &Learnt) -> Vec<String> {
     machine.axes.iter().zip(&learnt.robustness).filter_map(of).collect()
 }
 
+/// Why learning could not begin.
+fn not_learnt(why: &DriveError) -> String {
+    format!("no correction is learnt: {why}")
+}
+
+/// Why no correction came of it, if none did.
+fn no_better(learnt: &Learnt) -> Option<String> {
+    (learnt.best_repeat == 0)
+        .then(|| format!("no correction was better than none; ended: {}", ended(&learnt.stopped)))
+}
+
 fn ended(reason: &Reason) -> String {
     match reason {
         Reason::Repeats => "all repeats made".to_owned(),
@@ -538,9 +564,11 @@ struct RefusalJson {
 #[derive(Serialize)]
 struct LearningJson<'run> {
     repeats: Vec<RepeatJson>,
-    best_repeat: usize,
-    ended: String,
+    best_repeat: Option<usize>,
+    ended: Option<String>,
     robustness: Vec<RobustnessJson<'run>>,
+    /// Null if a correction was learnt.
+    reason: Option<String>,
 }
 
 #[derive(Serialize)]
@@ -650,38 +678,46 @@ fn json<'run>(
     machine: &'run Machine,
     tunings: &'run [Tuned],
     verification: &Verification,
-    learnt: Option<&Learnt>,
+    learnt: Option<&Result<Learnt, DriveError>>,
     (output, reason): (Option<String>, Option<String>),
 ) -> TuneJson<'run> {
     TuneJson {
         axes: tunings.iter().map(|tuned| axis_json(&machine.axes[tuned.axis].name, tuned)).collect(),
         verification: verification.json(),
-        learning: learnt.map(|learnt| LearningJson {
-            repeats: learnt
-                .repeats
-                .iter()
-                .map(|figures| RepeatJson {
-                    contour_error_um: figures.contour_um,
-                    following_error_um_rms: figures.rms_um,
-                })
-                .collect(),
-            best_repeat: learnt.best_repeat,
-            ended: ended(&learnt.stopped),
-            robustness: machine
-                .axes
-                .iter()
-                .zip(&learnt.robustness)
-                .filter_map(|(axis, robustness)| robustness.map(|robustness| (axis, robustness)))
-                .map(|(axis, robustness)| RobustnessJson {
-                    axis: &axis.name,
-                    filter_corner_hz: robustness.filter.corner_hz,
-                    contraction: robustness.contraction,
-                    contraction_hz: robustness.at_hz,
-                })
-                .collect(),
-        }),
+        learning: learnt.map(|learnt| learning_json(machine, learnt)),
         output,
         reason,
+    }
+}
+
+fn learning_json<'run>(machine: &'run Machine, learnt: &Result<Learnt, DriveError>) -> LearningJson<'run> {
+    let learnt = match learnt {
+        Ok(learnt) => learnt,
+        Err(why) => {
+            let (repeats, best_repeat, ended, robustness) = (vec![], None, None, vec![]);
+            return LearningJson { repeats, best_repeat, ended, robustness, reason: Some(not_learnt(why)) };
+        }
+    };
+    let repeat = |figures: &RepeatFigures| RepeatJson {
+        contour_error_um: figures.contour_um,
+        following_error_um_rms: figures.rms_um,
+    };
+    let axes = machine.axes.iter().zip(&learnt.robustness);
+    let robustness = axes.filter_map(|(axis, robustness)| {
+        let Robustness { filter, contraction, at_hz, .. } = robustness.as_ref()?;
+        Some(RobustnessJson {
+            axis: &axis.name,
+            filter_corner_hz: filter.corner_hz,
+            contraction: *contraction,
+            contraction_hz: *at_hz,
+        })
+    });
+    LearningJson {
+        repeats: learnt.repeats.iter().map(repeat).collect(),
+        best_repeat: Some(learnt.best_repeat),
+        ended: Some(ended(&learnt.stopped)),
+        robustness: robustness.collect(),
+        reason: no_better(learnt),
     }
 }
 

@@ -287,6 +287,9 @@ fn of_plane(machine: &Machine, circles: &Circles<'_>, tuning: &Tuning<'_>, findi
 fn of_learning(machine: &Machine, repeats: &[LearntRow], words: &[String], findings: &mut Findings) {
     findings.section("Learning");
     findings.notes(words.iter().map(String::as_str));
+    if repeats.is_empty() {
+        return;
+    }
     let over = |value: &dyn Fn(&LearntRow) -> f64| -> Vec<(f64, f64)> {
         repeats.iter().enumerate().map(|(repeat, row)| (repeat as f64, value(row))).collect()
     };

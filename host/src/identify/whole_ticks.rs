@@ -1,0 +1,257 @@
+//! Ticks of the model without an event, each as one linear map.
+//!
+//! Between events the sub-steps of a tick are linear in the state at its start, the two commands that come out of the
+//! dead time, and the signs of friction and limit. So is their product. It has the bits of no sub-step, but their values
+//! to the last digits, for a fifth of the time.
+//!
+//! Whether a tick is free of events is judged from both its ends and from how far the demand can be off in between. In
+//! doubt it is none: the sub-steps decide.
+
+use super::simulation::{CROSSING, Delayed, LANES, Lane, Model, State};
+
+/// What a map makes: position, last demand, and the state of the drive, and of a bed.
+const ROWS: usize = 9;
+const ROWS_RIGID: usize = 6;
+/// Rows before those of the state, which are columns, too.
+const OUTPUTS: usize = 2;
+/// Columns of the map: the state, and up to four inputs.
+const COLUMNS: usize = ROWS - OUTPUTS + 4;
+
+/// Rates over one tick up to which both ends of it tell what is between.
+const SLOW: f64 = 1.0;
+
+type Column = [Lane; ROWS];
+
+/// What acts during a whole tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Regime {
+    /// The axis stands: friction bears all.
+    Stuck,
+    /// Friction has one sign, the demand is within the limit.
+    Sliding,
+    /// Friction has one sign, the integrator stands, the demand is beyond the limit.
+    Saturated,
+}
+
+impl Regime {
+    /// Inputs besides the state: both commands, the sign of friction, the sign of the limit.
+    fn inputs(self) -> usize {
+        match self {
+            Self::Stuck => 2,
+            Self::Sliding => 3,
+            Self::Saturated => 4,
+        }
+    }
+}
+
+/// The maps of a model.
+pub(super) struct WholeTicks {
+    tick_s: f64,
+    stuck: Vec<Column>,
+    sliding: Vec<Column>,
+    saturated: Vec<Column>,
+}
+
+impl State {
+    fn of_column(column: &[Lane; ROWS]) -> Self {
+        let &[position, demand, command, integral, torque, velocity, bed, bed_velocity, bed_accel] = column;
+        Self {
+            command,
+            integral,
+            demand,
+            torque,
+            velocity,
+            position,
+            bed,
+            bed_velocity,
+            bed_accel,
+            is_frozen: false,
+        }
+    }
+
+    fn to_column(&self) -> [Lane; ROWS] {
+        [
+            self.position,
+            self.demand,
+            self.command,
+            self.integral,
+            self.torque,
+            self.velocity,
+            self.bed,
+            self.bed_velocity,
+            self.bed_accel,
+        ]
+    }
+}
+
+impl WholeTicks {
+    /// `None` for a model that moves too much within a tick.
+    pub(super) fn new(model: &Model, tick_s: f64, substeps: u32) -> Option<Self> {
+        let is_slow = |lane: usize| {
+            model.velocity_gain[lane] * tick_s <= SLOW && model.stiffness[lane].sqrt() * tick_s <= SLOW
+        };
+        let of = |regime| columns(model, substeps, regime);
+        (0..LANES).all(is_slow).then(|| Self {
+            tick_s,
+            stuck: of(Regime::Stuck),
+            sliding: of(Regime::Sliding),
+            saturated: of(Regime::Saturated),
+        })
+    }
+
+    /// Takes a tick at once, and says so, if it is free of events.
+    #[inline]
+    pub(super) fn advance(&self, model: &Model, state: &mut State, delayed: &Delayed) -> bool {
+        if model.has_bed {
+            self.advance_rows::<ROWS>(model, state, delayed)
+        } else {
+            self.advance_rows::<ROWS_RIGID>(model, state, delayed)
+        }
+    }
+
+    #[inline(always)]
+    fn advance_rows<const R: usize>(&self, model: &Model, state: &mut State, delayed: &Delayed) -> bool {
+        let start = Start::of(model, state, delayed);
+        let Some(regime) = start.regime(model, state) else { return false };
+        let map = match regime {
+            Regime::Stuck => &self.stuck,
+            Regime::Sliding => &self.sliding,
+            Regime::Saturated => &self.saturated,
+        };
+        let from = state.to_column();
+        let inputs =
+            [delayed.earlier, delayed.late, state.velocity.map(f64::signum), start.demand.map(f64::signum)];
+        let mut next = [[0.0; LANES]; R];
+        for (column, by) in map.iter().zip(from[OUTPUTS..R].iter().chain(&inputs)) {
+            for (sum, cells) in next.iter_mut().zip(column) {
+                for lane in 0..LANES {
+                    sum[lane] += cells[lane] * by[lane];
+                }
+            }
+        }
+        let mut column = [[0.0; LANES]; ROWS];
+        column[..R].copy_from_slice(&next);
+        let end = State { is_frozen: state.is_frozen, ..State::of_column(&column) };
+        if !start.is_without_events(regime, model, state, &end, self.tick_s) {
+            return false;
+        }
+        let position = core::array::from_fn(|lane| state.position[lane] + end.position[lane]);
+        *state = State { position, ..end };
+        true
+    }
+}
+
+/// The map of a regime, column by column: what a tick makes of each state and input of 1.
+fn columns(model: &Model, substeps: u32, regime: Regime) -> Vec<Column> {
+    let states = if model.has_bed { ROWS } else { ROWS_RIGID } - OUTPUTS;
+    let of = |index: usize| {
+        let of_input = |input: usize| if index == states + input { [1.0; LANES] } else { [0.0; LANES] };
+        let mut column = [[0.0; LANES]; ROWS];
+        if index < states {
+            column[OUTPUTS + index] = [1.0; LANES];
+        }
+        let mut state = State::of_column(&column);
+        let delayed = Delayed { earlier: of_input(0), late: of_input(1) };
+        let (friction, limit) = (of_input(2), of_input(3));
+        for step in 0..substeps {
+            let (error, demand) = model.ask(&mut state, &model.delayed_in(&delayed, step));
+            let (runs, limited) = match regime {
+                Regime::Saturated => (0.0, core::array::from_fn(|lane| limit[lane] * model.limit[lane])),
+                Regime::Stuck | Regime::Sliding => (1.0, demand),
+            };
+            state.demand = demand;
+            model.push(&mut state, &error, &[runs; LANES], &limited);
+            model.travel(&mut state, |lane, pushed| match regime {
+                Regime::Stuck => pushed,
+                Regime::Sliding | Regime::Saturated => friction[lane] * model.coulomb_step[lane],
+            });
+        }
+        state.to_column()
+    };
+    (0..(states + regime.inputs()).min(COLUMNS)).map(of).collect()
+}
+
+/// What the first sub-step of a tick asks for.
+struct Start {
+    error: Lane,
+    demand: Lane,
+    /// How far the command jumps within the tick \[mm/s\].
+    jump: Lane,
+}
+
+impl Start {
+    #[inline(always)]
+    fn of(model: &Model, state: &State, delayed: &Delayed) -> Self {
+        let first = model.delayed_in(delayed, 0);
+        let mut start = Self { error: [0.0; LANES], demand: [0.0; LANES], jump: [0.0; LANES] };
+        for (lane, first) in first.iter().enumerate() {
+            let command = state.command[lane] + model.filter_share[lane] * (first - state.command[lane]);
+            start.error[lane] = command - state.velocity[lane];
+            start.demand[lane] = model.velocity_gain[lane] * start.error[lane] + state.integral[lane];
+            start.jump[lane] = (delayed.late[lane] - delayed.earlier[lane]).abs();
+        }
+        start
+    }
+
+    /// The regime that all lanes may be in.
+    #[inline(always)]
+    fn regime(&self, model: &Model, state: &State) -> Option<Regime> {
+        let (mut within, mut beyond, mut moving, mut standing) = (true, true, true, true);
+        for lane in 0..LANES {
+            let (demand, limit) = (self.demand[lane].abs(), model.limit[lane]);
+            let jump = model.velocity_gain[lane] * self.jump[lane];
+            within &= demand + jump < (1.0 - CROSSING) * limit;
+            beyond &= demand - jump > (1.0 + CROSSING) * limit;
+            moving &= state.velocity[lane] != 0.0;
+            standing &= state.velocity[lane] == 0.0;
+        }
+        match (within && !state.is_frozen, beyond && state.is_frozen) {
+            (true, _) if moving => Some(Regime::Sliding),
+            (true, _) if standing => Some(Regime::Stuck),
+            (_, true) if moving => Some(Regime::Saturated),
+            _ => None,
+        }
+    }
+
+    /// Whether nothing can have happened between the start and this end of the tick.
+    #[inline(always)]
+    fn is_without_events(
+        &self,
+        regime: Regime,
+        model: &Model,
+        state: &State,
+        end: &State,
+        tick_s: f64,
+    ) -> bool {
+        let mut is_without = true;
+        for lane in 0..LANES {
+            let (start, last, limit) = (self.demand[lane], end.demand[lane], model.limit[lane]);
+            // What the demand, and what the acceleration may vary by.
+            let varies = (last - start).abs() + model.velocity_gain[lane] * self.jump[lane];
+            let bed_varies = (end.bed_accel[lane] - state.bed_accel[lane]).abs();
+            let slides = |accel_varies: f64| {
+                let sign = state.velocity[lane].signum();
+                let least = (sign * state.velocity[lane]).min(sign * end.velocity[lane]);
+                least > 0.5 * tick_s * (accel_varies + bed_varies)
+            };
+            let is_within = start.abs().max(last.abs()) + varies < (1.0 - CROSSING) * limit;
+            let pushes = (start - state.torque[lane]).abs() + varies;
+            is_without &= match regime {
+                Regime::Sliding => is_within && slides(pushes),
+                Regime::Stuck => {
+                    let pushed = (state.torque[lane] - state.bed_accel[lane]).abs() + pushes + bed_varies;
+                    is_within && model.step_s * pushed < model.coulomb_step[lane]
+                }
+                Regime::Saturated => {
+                    let sign = start.signum();
+                    let error = end.command[lane] - end.velocity[lane];
+                    let error_varies = (error - self.error[lane]).abs() + self.jump[lane];
+                    (sign * start).min(sign * last) - varies > (1.0 + CROSSING) * limit
+                        && sign * self.error[lane] > error_varies
+                        && slides(2.0 * (sign * limit - state.torque[lane]).abs())
+                }
+            };
+        }
+        is_without
+    }
+}
