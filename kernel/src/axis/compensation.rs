@@ -171,6 +171,8 @@ struct Table<R> {
     intervals: u16,
     repeats: bool,
     per_spacing: R,
+    step_mm: R,
+    half_step_mm: R,
     steps: [i16; COMPENSATION_POINTS_MAX],
 }
 
@@ -211,6 +213,8 @@ impl<R: Real> Table<R> {
             intervals,
             repeats,
             per_spacing: R::from_f64(1.0 / spacing_mm),
+            step_mm: R::from_f64(STEP_MM),
+            half_step_mm: R::from_f64(0.5 * STEP_MM),
             steps,
         }
     }
@@ -227,7 +231,7 @@ impl<R: Real> Table<R> {
         let ahead = (load - self.start).to_bits();
         let intervals = usize::from(self.intervals);
         let holds = |index: usize| Curve {
-            error_mm: steps::<R>(self.step(index)) * R::from_f64(STEP_MM),
+            error_mm: steps::<R>(self.step(index)) * self.step_mm,
             first_mm: R::ZERO,
             second_mm: R::ZERO,
         };
@@ -255,11 +259,11 @@ impl<R: Real> Table<R> {
         // Twice the slopes at both ends; with h = to − from: error = from + t·(m₀ + t·(b + t·a)).
         let (m0, m1, h) = (to - before, after - from, to - from);
         let (a, b) = (m0 + m1 - 4 * h, 6 * h - 2 * m0 - m1);
-        let [m0, a, b] = [m0, a, b].map(|twice| steps::<R>(twice) * R::from_f64(0.5 * STEP_MM));
+        let [m0, a, b] = [m0, a, b].map(|twice| steps::<R>(twice) * self.half_step_mm);
         let ta = t * a;
         let (ta2, ta3) = (ta + ta, ta + ta + ta);
         Curve {
-            error_mm: steps::<R>(from) * R::from_f64(STEP_MM) + t * (m0 + t * (b + ta)),
+            error_mm: steps::<R>(from) * self.step_mm + t * (m0 + t * (b + ta)),
             first_mm: m0 + t * (b + b + ta3),
             second_mm: b + b + ta2 + ta2 + ta2,
         }
@@ -318,8 +322,8 @@ impl<R: Real> TakeUp<R> {
         } else {
             let u = number::<R>(ticks) * self.per_tick;
             let u2 = u * u;
-            let [c4, c5, c6, c7] = [35.0, -84.0, 70.0, -20.0].map(R::from_f64);
-            u2 * u2 * (c4 + u * (c5 + u * (c6 + u * c7)))
+            let [c4, c5, c6, c7] = [35, 84, 70, 20].map(number::<R>);
+            u2 * u2 * (c4 - u * (c5 - u * (c6 - u * c7)))
         };
         let share = if is_negative { share } else { R::ONE - share };
         -(self.play_mm * share)
@@ -332,7 +336,7 @@ impl<R: Real> TakeUp<R> {
         }
         let u = number::<R>(ticks) * self.per_tick;
         let w = u * (R::ONE - u);
-        let [s1, s2, s3, five] = [140.0, 420.0, 840.0, 5.0].map(R::from_f64);
+        let [s1, s2, s3, five] = [140, 420, 840, 5].map(number::<R>);
         let velocity = self.velocity_mm_s * (s1 * w * w * w);
         let accel = self.accel_mm_s2 * (s2 * w * w * (R::ONE - u - u));
         let jerk = self.jerk_mm_s3 * (s3 * w * (R::ONE - five * w));
@@ -355,6 +359,7 @@ pub(super) struct CompensationConfig<R> {
     preview_ticks: u8,
     /// Greatest velocity that the output can command \[mm/s\]: beyond, feedforward of the table's slope does not grow.
     most_mm_s: R,
+    moving_mm_s: R,
 }
 
 /// The state of compensation. The default is that after motion in positive direction.
@@ -388,7 +393,7 @@ impl<R: Real> CompensationConfig<R> {
         }
         let take_up = compensation.backlash.as_ref();
         let take_up = take_up.map(|backlash| TakeUp::new(check, backlash, most_mm_s.to_f64(), tick_s));
-        Self { table, take_up, preview_ticks, most_mm_s }
+        Self { table, take_up, preview_ticks, most_mm_s, moving_mm_s: R::from_f64(MOVING_MM_S) }
     }
 
     /// All ticks of a take-up, those included after which position set-points have passed it.
@@ -417,8 +422,8 @@ impl<R: Real> CompensationConfig<R> {
             return;
         }
         if state.ticks_left == 0 {
-            let moving = R::from_f64(MOVING_MM_S);
-            let is_other = if state.is_negative { velocity_mm_s > moving } else { velocity_mm_s < -moving };
+            let least = self.moving_mm_s;
+            let is_other = if state.is_negative { velocity_mm_s > least } else { velocity_mm_s < -least };
             if !is_other {
                 return;
             }
