@@ -104,6 +104,8 @@ impl<const AXES: usize> DriveEnable<AXES> for InMemory<AXES> {
 pub enum LoopError {
     /// An axis can't be regulated.
     Axes(AxesError),
+    /// The program's machine has compensation, which this loop has not.
+    Compensated,
     /// The program's guards can't be read.
     #[cfg(feature = "live")]
     Program(ProgramError),
@@ -161,6 +163,9 @@ pub fn close<
     streams: &'a mut Streams<R, AXES, PIECES, SEGMENTS>,
     machine: &'a SimMachine<AXES, LINE>,
 ) -> Result<Closed<'a, R, AXES, LINE>, LoopError> {
+    if program.is_compensated() {
+        return Err(LoopError::Compensated);
+    }
     let config = &regulated(program.header());
     let config = config.as_ref().map_err(|error| *error)?;
     let &Header { tick_s, rules, start, .. } = program.header();
