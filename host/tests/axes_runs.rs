@@ -65,6 +65,7 @@ fn job<const N: usize>(machine: &Machine<N>, number: Number, points_mm: &[[f64; 
         number,
         header: machine.header(),
         guards: machine.guards(),
+        compensation: machine.compensation(),
         items: moves(machine, points_mm),
         correction: None,
         script: None,
