@@ -9,6 +9,7 @@ use crate::drive::{DriveModel, DriveState};
 use crate::drive_parameters::{DriveParameters, REFERENCE_X, REFERENCE_Y, REFERENCE_Z};
 use crate::encoder::{EncoderParameters, REFERENCE_ENCODER, SimEncoder};
 use crate::parameter::{ParameterError, finite};
+use crate::screw::{Screw, ScrewParameters};
 
 /// Velocity of the reference axes per volt \[mm/s/V\]: 20 m/min at 10 V (S4).
 pub const REFERENCE_MM_S_PER_VOLT: f64 = 20_000.0 / 60.0 / 10.0;
@@ -18,11 +19,13 @@ pub const REFERENCE_MM_S_PER_VOLT: f64 = 20_000.0 / 60.0 / 10.0;
 pub struct AxisParameters {
     /// Drive and mechanics.
     pub drive: DriveParameters,
-    /// Position feedback.
+    /// The errors of the screw between motor and load.
+    pub screw: ScrewParameters,
+    /// Position feedback, of the motor.
     pub encoder: EncoderParameters,
     /// Velocity of the drive per volt \[mm/s/V\], not 0; negative if it is wired the other way round.
     pub mm_s_per_volt: f64,
-    /// True position at the start \[mm\]; the axis is at rest there.
+    /// True position of motor and load at the start \[mm\]; the axis is at rest there.
     pub start_position_mm: f64,
 }
 
@@ -37,6 +40,7 @@ impl AxisParameters {
     const fn reference(drive: DriveParameters) -> Self {
         Self {
             drive,
+            screw: ScrewParameters { pitch_error: None, backlash_mm: 0.0 },
             encoder: REFERENCE_ENCODER,
             mm_s_per_volt: REFERENCE_MM_S_PER_VOLT,
             start_position_mm: 0.0,
@@ -49,6 +53,7 @@ impl AxisParameters {
 pub struct SimAxis<const LINE: usize> {
     model: DriveModel,
     state: DriveState<LINE>,
+    screw: Screw,
     encoder: SimEncoder,
     mm_s_per_volt: f64,
 }
@@ -59,7 +64,7 @@ impl<const LINE: usize> SimAxis<LINE> {
     /// # Errors
     /// The first parameter that cannot be simulated.
     pub fn new(parameters: AxisParameters, tick_s: f64, substeps: u32) -> Result<Self, ParameterError> {
-        let AxisParameters { drive, encoder, mm_s_per_volt, start_position_mm } = parameters;
+        let AxisParameters { drive, screw, encoder, mm_s_per_volt, start_position_mm } = parameters;
         finite("mm_s_per_volt", mm_s_per_volt)?;
         if mm_s_per_volt == 0.0 {
             return Err(ParameterError::OutOfRange { quantity: "mm_s_per_volt", value: mm_s_per_volt });
@@ -69,6 +74,7 @@ impl<const LINE: usize> SimAxis<LINE> {
         Ok(Self {
             model,
             state: DriveState::at_rest(&model, start_position_mm)?,
+            screw: Screw::new(screw, start_position_mm)?,
             encoder: SimEncoder::new(encoder, start_position_mm)?,
             mm_s_per_volt,
         })
@@ -79,6 +85,7 @@ impl<const LINE: usize> SimAxis<LINE> {
     pub fn advance(&mut self, output_v: f64, is_enabled: bool) {
         let command_mm_s = if is_enabled { output_v * self.mm_s_per_volt } else { 0.0 };
         self.model.tick(&mut self.state, command_mm_s);
+        self.screw.turn(self.state.position_mm());
     }
 
     /// See [`SimMachine::reverse_drive`](crate::SimMachine::reverse_drive).
@@ -96,7 +103,13 @@ impl<const LINE: usize> SimAxis<LINE> {
         self.encoder.latch(self.state.position_mm())
     }
 
-    /// The drive's state: true position, velocity, torque.
+    /// True position of the load \[mm\]: the motor's, without errors of the screw.
+    #[must_use]
+    pub fn load_mm(&self) -> f64 {
+        self.screw.load_mm()
+    }
+
+    /// The drive's state: the motor's true position, velocity, torque.
     #[must_use]
     pub fn drive(&self) -> &DriveState<LINE> {
         &self.state

@@ -29,6 +29,7 @@ use crate::dac_chip::{Ad5754Chip, ChipError};
 use crate::drive_parameters::{REFERENCE_X, REFERENCE_Y};
 use crate::encoder::{EncoderParameters, REFERENCE_ENCODER};
 use crate::machine::{MachineParameters, SimMachine};
+use crate::screw::ScrewParameters;
 
 /// The reference drives with a program's scales: the first axis is S4's X, the second its Y, all others are
 /// like X.
@@ -40,6 +41,7 @@ pub fn reference_machine<const AXES: usize>(header: &Header<AXES>, substeps: u32
     }
     let axes = core::array::from_fn(|axis| AxisParameters {
         drive: drives[axis],
+        screw: ScrewParameters::default(),
         encoder: EncoderParameters { resolution_mm: header.axes[axis].mm_per_count, ..REFERENCE_ENCODER },
         mm_s_per_volt: header.axes[axis].mm_s_at_10_v / DacCode::FULL_SCALE_V,
         start_position_mm: 0.0,
@@ -102,6 +104,8 @@ impl<const AXES: usize> DriveEnable<AXES> for InMemory<AXES> {
 pub enum LoopError {
     /// An axis can't be regulated.
     Axes(AxesError),
+    /// The program's machine has compensation, which this loop has not.
+    Compensated,
     /// The program's guards can't be read.
     #[cfg(feature = "live")]
     Program(ProgramError),
@@ -159,6 +163,9 @@ pub fn close<
     streams: &'a mut Streams<R, AXES, PIECES, SEGMENTS>,
     machine: &'a SimMachine<AXES, LINE>,
 ) -> Result<Closed<'a, R, AXES, LINE>, LoopError> {
+    if program.is_compensated() {
+        return Err(LoopError::Compensated);
+    }
     let config = &regulated(program.header());
     let config = config.as_ref().map_err(|error| *error)?;
     let &Header { tick_s, rules, start, .. } = program.header();

@@ -15,7 +15,7 @@
 //!               │ volts, held over the tick
 //!               ▼
 //!            DriveModel      dead time, velocity controller, current limit, inertia, friction, bed
-//!               │ true position
+//!               │ the motor's true position ───► Screw: pitch error, play ───► the load's
 //!               ▼
 //!            SimEncoder      counts, 16- or 32-bit timer, noise
 //!               │ the kernel's own CountExtender
@@ -66,7 +66,7 @@
 //! | following error at 4 Hz and 2.150 m/min, V / V+A+J feedforward \[µm\] | 11 / 4 | 10.5 / 4.2 |
 //! | form deviation of a circle at 13 Hz \[µm\] | 32 | 31.5 |
 //!
-//! Missing: backlash, pitch error, cogging, coupling of the axes through the bed, thermal limits of the
+//! Missing: cogging, elasticity of the screw, coupling of the axes through the bed, thermal limits of the
 //! motor.
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]
@@ -84,6 +84,7 @@ mod injection;
 mod machine;
 mod noise;
 mod parameter;
+mod screw;
 
 pub use axis::{AxisParameters, REFERENCE_MM_S_PER_VOLT, SimAxis};
 pub use dac_chip::{Ad5754Chip, CHANNELS, ChipError, POWER_UP_TIME_NS};
@@ -98,3 +99,4 @@ pub use machine::{
     SimMachine,
 };
 pub use parameter::ParameterError;
+pub use screw::{PitchErrorParameters, ScrewParameters};

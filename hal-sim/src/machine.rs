@@ -65,9 +65,11 @@ impl core::error::Error for MachineError {}
 /// The true state of an axis, which only a simulation knows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisTruth {
-    /// Position \[mm\].
+    /// Position of the load \[mm\].
     pub position_mm: f64,
-    /// Velocity \[mm/s\].
+    /// Position of the motor \[mm\], which the encoder reads: another one only through errors of the screw.
+    pub motor_mm: f64,
+    /// Velocity of the motor \[mm/s\].
     pub velocity_mm_s: f64,
     /// Torque, as the acceleration it gives the unloaded axis \[mm/s²\].
     pub torque_mm_s2: f64,
@@ -171,12 +173,12 @@ impl<const AXES: usize, const LINE: usize, const CHIPS: usize> SimMachine<AXES, 
         }
     }
 
-    /// The true position of an axis, for switches there \[mm\]; none if there is no such axis. Without a panic, for images that
+    /// The true position of an axis' load, for switches there \[mm\]; none if there is no such axis. Without a panic, for images that
     /// have none.
     #[must_use]
     pub fn position_mm(&self, axis: usize) -> Option<f64> {
         let axes = self.axes.try_borrow().ok()?;
-        Some(axes.get(axis)?.drive().position_mm())
+        Some(axes.get(axis)?.load_mm())
     }
 
     /// The true state of all axes, for tests and records.
@@ -186,7 +188,8 @@ impl<const AXES: usize, const LINE: usize, const CHIPS: usize> SimMachine<AXES, 
         core::array::from_fn(|axis| {
             let drive = axes[axis].drive();
             AxisTruth {
-                position_mm: drive.position_mm(),
+                position_mm: axes[axis].load_mm(),
+                motor_mm: drive.position_mm(),
                 velocity_mm_s: drive.velocity_mm_s(),
                 torque_mm_s2: drive.torque_mm_s2(),
                 bed_mm: drive.bed_mm(),

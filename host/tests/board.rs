@@ -13,7 +13,7 @@ use motion_host::board::home::OnBoardHoming;
 use motion_host::board::items::{InPlanning, Source};
 use motion_host::board::job::parameters;
 use motion_host::board::jog::Jogs;
-use motion_host::board::parameters::{Figures, read, write};
+use motion_host::board::parameters::{Difference, Figures, read, write};
 use motion_host::board::scope::Ticks;
 use motion_host::board::sender::{Found, Permissions};
 use motion_host::board::simulator::{self, SimulatedBoard};
@@ -23,6 +23,7 @@ use motion_host::machine::{HomingSettings, Machine};
 use motion_host::planning::Executable;
 use motion_host::simulate::home::{HomedAxis, Homes};
 use motion_host::simulate::jog::{Ended, Keys, Press};
+use motion_kernel::axis::{AxisCompensation, Backlash, PitchError};
 use motion_kernel::homing::{Homed, HomingConfig};
 use motion_kernel::jog::Direction;
 use motion_kernel::link::{HomingFailure, HomingProgress, State, WriteError};
@@ -714,6 +715,66 @@ fn stands_mm(connection: &Connection<3>) -> f64 {
 struct Told {
     rows: Vec<(u64, [f64; 3], &'static str)>,
     missing: Vec<(u64, u64)>,
+}
+
+/// A board is given a machine with compensation, tells it again, and drives with it: its ticks, run again, come to the same, so
+/// both ends compensate alike. A table that is too steep is refused.
+#[test]
+fn a_board_gets_compensation_and_its_ticks_show_it() {
+    let machine = Machine::reference();
+    let compensated = |most_um: f64| {
+        let mut machine = Machine::reference();
+        let points_um = [0.0, most_um, 0.0, -most_um];
+        for axis in &mut machine.axes[..2] {
+            axis.compensation = Some(AxisCompensation {
+                backlash: Some(Backlash { play_mm: 0.02, take_up_s: 0.006 }),
+                pitch_error: PitchError::new(-1.0, 1.25, &points_um, true),
+            });
+        }
+        machine
+    };
+    let other = compensated(10.0);
+    let (first, second) = (parameters::<3, 3>(&machine), parameters::<3, 3>(&other));
+    println!("{} bytes, {} with the compensation of two axes", first.len(), second.len());
+    let figures = |record: &[u8]| Figures::of::<3>(record).expect("a record");
+    let differences = figures(&first).differences(&figures(&second));
+    let is_of_it = |difference: &Difference| difference.name.starts_with("compensation.axes[");
+    assert!(!differences.is_empty() && differences.iter().all(is_of_it), "{differences:?}");
+    let (_board, address) = board(&machine, 61);
+    let mut connection = connect(address, 61);
+    assert_eq!(read(&mut connection).expect("an answer"), first);
+    let refused = write(&mut connection, &parameters::<3, 3>(&compensated(26.0)));
+    assert!(matches!(refused, Err(BoardError::Parameters(WriteError::Unsuitable))), "{refused:?}");
+    write(&mut connection, &second).expect("suits");
+    assert_eq!(read(&mut connection).expect("an answer"), second);
+    drop(connection);
+    let mut connection = connect(address, 62);
+    // A program for the machine without it is for another machine.
+    let foreign = drive(&job(&zigzag(10), &machine), ENABLES, &mut connection, |_, _, _| false);
+    assert!(matches!(foreign, Err(BoardError::Disagrees { .. })), "{foreign:?}");
+    drop(connection);
+    let job = job(&zigzag(40), &other);
+    let mut connection = connect(address, 63);
+    let record = read(&mut connection).expect("its parameters");
+    let most_um = Arc::new(Mutex::new(0.0_f64));
+    let sink = {
+        let most_um = Arc::clone(&most_um);
+        Box::new(move |ticks: Ticks<'_, 3>| {
+            if let Ticks::Row(row) = ticks {
+                let mut most_um = most_um.lock().expect("sound");
+                *most_um = most_um.max(row.axes[0].err_um.abs());
+            }
+        })
+    };
+    let identity = *connection.identity().expect("greeted");
+    connection.set_scope(Scope::start(&identity, &record, sink).expect("a machine"));
+    assert_eq!(drive(&job, ENABLES, &mut connection, |_, _, _| false).expect("driven"), Step::Done);
+    assert_eq!(stands(&connection), end(&job));
+    let summary = connection.end_scope().expect("begun");
+    assert_eq!((summary.error, summary.is_foreign), (None, false));
+    assert!(summary.ticks > 1000, "{summary:?}");
+    let most_um = *most_um.lock().expect("sound");
+    assert!(most_um > 0.0, "{most_um}");
 }
 
 /// A program with a hold, another override and a cable that is cut: every tick is there, to the last one at the program's end, or

@@ -12,6 +12,7 @@ mod accuracy;
 mod blends;
 mod boards;
 mod bytes;
+mod compensation;
 mod faults;
 mod feedforward;
 mod fixed_range;

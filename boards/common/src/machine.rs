@@ -113,6 +113,7 @@ impl<'a, R: Real, const AXES: usize> Machine<'a, R, AXES> {
         let guards = program.guards().map_err(MachineError::Program)?.ok_or(MachineError::Unguarded)?;
         let axes = AxesConfig::new(axes, expected).and_then(|axes| axes.guarded(&guards, expected));
         let axes = axes.map_err(MachineError::Axes)?;
+        let axes = if program.is_compensated() { compensated(axes, &program)? } else { axes };
         let homing = program.homing().map_err(MachineError::Program)?;
         Ok(Self { program, axes, homing })
     }
@@ -122,6 +123,16 @@ impl<'a, R: Real, const AXES: usize> Machine<'a, R, AXES> {
     pub fn header(&self) -> &Header<AXES> {
         self.program.header()
     }
+}
+
+/// The axes with what their machine's screws need. In its own stack frame: a table of each axis is there once more.
+#[inline(never)]
+fn compensated<R: Real, const AXES: usize>(
+    axes: AxesConfig<R, AXES>,
+    program: &Reader<'_, AXES>,
+) -> Result<AxesConfig<R, AXES>, MachineError> {
+    let compensation = program.compensation().map_err(MachineError::Program)?;
+    axes.compensated(&compensation, program.header().tick_s).map_err(MachineError::Axes)
 }
 
 /// Whether the board can put out every state of spindle and coolant that the program asks for, the last of them off.
@@ -150,8 +161,8 @@ fn check_switches<const AXES: usize>(
 
 #[cfg(test)]
 mod tests {
-    use motion_kernel::axis::{GuardFigures, Guards};
-    use motion_kernel::program::{Item, SupplyError, write};
+    use motion_kernel::axis::{AxisCompensation, Backlash, Compensation, GuardFigures, Guards, PitchError};
+    use motion_kernel::program::{Item, SupplyError, write, write_compensated};
     use motion_kernel::units::Position;
 
     use super::*;
@@ -188,6 +199,27 @@ mod tests {
         assert!(guards().axes.iter().all(Option::is_some));
         // 0.1 s.
         assert_eq!(guards().reactions.ramp_ticks, 200);
+    }
+
+    /// As the PC has it; too steep a table is refused like any figure.
+    #[test]
+    fn compensation_is_that_of_the_program() {
+        let header = *machine().header();
+        let of = |spacing_mm: f64| {
+            let pitch_error = PitchError::new(0.0, spacing_mm, &[0.0, 10.0, -10.0], true);
+            let backlash = Some(Backlash { play_mm: 0.02, take_up_s: 0.006 });
+            let axes = [None, Some(AxisCompensation { backlash, pitch_error }), None];
+            (Compensation { axes }, HomingFigures { axes: [None; AXES] })
+        };
+        let read = |spacing_mm: f64| {
+            let (mut bytes, (compensation, homing)) = (Vec::new(), of(spacing_mm));
+            write_compensated(&header, &guards(), &homing, &compensation, &[], &mut bytes).expect("short");
+            Machine::without_items(bytes.leak(), &BOARD).map(|machine| machine.axes)
+        };
+        let expected = machine().axes.compensated(&of(1.25).0, TICK_S).expect("compensated");
+        assert_ne!(expected, machine().axes);
+        assert_eq!(read(1.25), Ok(expected));
+        assert!(matches!(read(0.5), Err(MachineError::Axes(AxesError { axis: 1, .. }))));
     }
 
     #[test]

@@ -40,11 +40,12 @@ impl Figures {
         let reader = Reader::<M>::new(record)?;
         let (header, guards): (&Header<M>, Option<Guards<M>>) = (reader.header(), reader.guards()?);
         let mut figures = Vec::new();
-        let homing = reader.homing()?;
+        let (homing, compensation) = (reader.homing()?, reader.compensation()?);
         let values = [
             ("", serde_json::to_value(header)),
             ("", serde_json::to_value(guards)),
             ("homing", serde_json::to_value(homing)),
+            ("compensation", serde_json::to_value(compensation)),
         ];
         for (name, value) in values {
             // All are structs of numbers.

@@ -115,9 +115,11 @@ impl<const N: usize> Scope<N> {
     fn start_in<R: Real>(parameters: &[u8], sink: Sink<N>) -> Result<Self, ScopeError> {
         let reader = Reader::<N>::new(parameters).map_err(ScopeError::Parameters)?;
         let guards = reader.guards().map_err(ScopeError::Parameters)?.ok_or(ScopeError::Unguarded)?;
+        let compensation = reader.compensation().map_err(ScopeError::Parameters)?;
         let header = *reader.header();
         let axes = AxesConfig::<R, N>::new(&header.axes, header.tick_s)
             .and_then(|axes| axes.guarded(&guards, header.tick_s))
+            .and_then(|axes| axes.compensated(&compensation, header.tick_s))
             .map_err(ScopeError::Axes)?;
         let (to, from) = channel();
         let (wants, has_failed) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));

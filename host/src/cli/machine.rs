@@ -39,6 +39,7 @@ struct KeyJson {
     key: &'static str,
     unit: &'static str,
     values: usize,
+    may_be_more: bool,
     range: &'static str,
     default: Option<&'static str>,
     meaning: &'static str,
@@ -64,13 +65,14 @@ pub fn print(arguments: &MachineArguments, out: &mut dyn Write) -> Result<Outcom
 }
 
 fn key_json(table: &KeyTable, key: &Key) -> KeyJson {
-    let &Key { name, unit, values, range, default, meaning } = key;
+    let &Key { name, unit, values, may_be_more, range, default, meaning } = key;
     KeyJson {
         table: table.name,
         table_is_optional: table.is_optional,
         key: name,
         unit,
         values,
+        may_be_more,
         range,
         default,
         meaning,
@@ -87,9 +89,13 @@ fn explain(out: &mut dyn Write) -> io::Result<()> {
         };
         let optional = if table.is_optional { " Optional." } else { "" };
         writeln!(out, "\n{heading}  {}{optional}", table.meaning)?;
-        for Key { name, unit, values, range, default, meaning } in table.keys {
+        for Key { name, unit, values, may_be_more, range, default, meaning } in table.keys {
             let unit = if unit.is_empty() { String::new() } else { format!(" [{unit}]") };
-            let times = if *values > 1 { format!("{values} times ") } else { String::new() };
+            let times = match (values, may_be_more) {
+                (1, _) => String::new(),
+                (values, false) => format!("{values} times "),
+                (values, true) => format!("{values} times or more "),
+            };
             let default = default.map_or_else(|| "required".to_owned(), |value| format!("default {value}"));
             writeln!(out, "  {name}{unit}: {times}{range}; {default}\n      {meaning}")?;
         }

@@ -26,7 +26,7 @@ Examples:
   motion parameters set --port /dev/ttyACM0 --machine mine.toml    gives the board the file's machine
 
 A board takes parameters while its drives are off (--disable switches them off), checks them, and starts anew with them. Its machine is a compiled
-program without items: limits, scales, gains, feedforward, guards, homing.
+program without items: limits, scales, gains, feedforward, guards, homing, compensation.
 
 JSON: get: {name: figure, …}; diff: list of {name, board, file}.
 Exit status: diff: 1 if something differs.";

@@ -47,7 +47,12 @@ impl<'a> Regulator<'a> {
     fn new(law: &'a Law, machine: &Machine) -> Result<Self, RunError> {
         Ok(match law {
             Law::Kernel => {
-                Self::Kernel(Box::new((machine.unguarded_axes_config()?, [AxisState::default(); AXES])))
+                let axes: AxesConfig<f32, AXES> = machine.unguarded_axes_config()?;
+                let mut states = [AxisState::default(); AXES];
+                for (state, config) in states.iter_mut().zip(&axes.axes) {
+                    state.set_position(config, Counts(0), Position::ZERO);
+                }
+                Self::Kernel(Box::new((axes, states)))
             }
             Law::Peer(gains) => Self::Peer(
                 Box::new(machine.unguarded_axes_config()?),
@@ -72,7 +77,7 @@ impl<'a> Regulator<'a> {
                 Self::Kernel(axes) => {
                     let (config, states) = axes.as_mut();
                     let setpoint = Setpoint {
-                        position: Position::default(),
+                        position: set[index],
                         velocity_mm_s: f32::from_f64(axis.vel_mm_s),
                         accel_mm_s2: f32::from_f64(axis.acc_mm_s2),
                         jerk_mm_s3: f32::from_f64(axis.jerk_mm_s3),

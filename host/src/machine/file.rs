@@ -3,11 +3,13 @@
 use std::ops::Range;
 
 use hal_sim::{
-    BedMode, DriveParameters, EncoderNoise, HomeParameters, IndexParameters, SwitchParameters, TimerBits,
+    BedMode, DriveParameters, EncoderNoise, HomeParameters, IndexParameters, PitchErrorParameters,
+    ScrewParameters, SwitchParameters, TimerBits,
 };
 use motion_kernel::axis::{
-    AxesConfig, BED_TICK_SHARE_MAX, BedInverse, DriveInverse, Feedforward, Gains, GuardFigures, Guards,
-    LEAD_ROUNDING_TICKS, PREVIEW_TICKS_MAX, TABLE_POINTS, Table, Tables,
+    AxesConfig, AxisCompensation, BED_TICK_SHARE_MAX, Backlash, BedInverse, COMPENSATION_POINTS_MAX,
+    Compensation, DriveInverse, Feedforward, Gains, GuardFigures, Guards, LEAD_ROUNDING_TICKS,
+    PITCH_ERROR_SLOPE_MAX, PREVIEW_TICKS_MAX, PitchError, TABLE_POINTS, Table, Tables,
 };
 use motion_kernel::fault::Reaction;
 use motion_kernel::homing::HomingConfig;
@@ -21,12 +23,13 @@ use toml::Spanned;
 use super::error::{MachineError, quote};
 use super::law_name::{LAW_NAMES, law_named};
 use super::range::{
-    AXIS_LETTER, AXIS_NAME, BlendTolerance, COOLANT_KINDS, Coordinate, CornerAngle, CurveShare, Damping,
-    DeadTime, EMERGENCY_STOP, ErrorGrowth, FeedforwardGain, FollowingError, Friction, Gain, Inertia,
-    IntegralTime, InverseGain, Jump, JunctionAngle, Lag, LeadTime, Length, LengthOrNone, Limit, Load,
-    MassRatio, NAME_CHARACTERS_MAX, NOISE_COUNTS, NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit, OutputOffset,
-    PATH_MODE, Place, Positive, Ramp, Resolution, Reversal, SPINDLE_TURNS, SUBROUTINE, SpindleSpeed,
-    SpindleTime, StopTime, TIMER_BITS, TablePoint, Tick, Velocity, Watch, Within,
+    AXIS_LETTER, AXIS_NAME, Amplitude, Angle, BlendTolerance, COOLANT_KINDS, Coordinate, CornerAngle,
+    CurveShare, Damping, DeadTime, EMERGENCY_STOP, ErrorGrowth, FeedforwardGain, FollowingError, Friction,
+    Gain, Inertia, IntegralTime, InverseGain, Jump, JunctionAngle, Lag, LeadTime, Length, LengthOrNone,
+    Limit, Load, MassRatio, NAME_CHARACTERS_MAX, NOISE_COUNTS, NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit,
+    OutputOffset, PATH_MODE, PitchErrorPoint, Place, Play, PlayOrNone, Positive, REPEATS, Ramp, Resolution,
+    Reversal, SPINDLE_TURNS, SUBROUTINE, Spacing, SpindleSpeed, SpindleTime, StopTime, TIMER_BITS,
+    TablePoint, Tick, Velocity, Watch, Within,
 };
 use super::settings::{
     AxisSettings, BLEND_TOLERANCE_MM, CORNER_ANGLE_DEG, CoolantSettings, DefaultPathMode, FaultSettings,
@@ -139,6 +142,27 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine<AXES_MAX>, M
             return Err(refuse(at.clone(), expected));
         }
     }
+    for (places, axis) in &axes {
+        let Some(AxisCompensation { backlash, pitch_error }) = &axis.compensation else { continue };
+        if let (Some(at), Some(backlash)) = (&places.take_up_s, backlash) {
+            let least_s = axis.take_up_s(backlash.play_mm);
+            if backlash.take_up_s < least_s {
+                let expected = format!(
+                    "at least {least_s:.6}, for at most feed_mm_s and half of the acceleration that the drive has"
+                );
+                return Err(refuse(at.clone(), expected));
+            }
+        }
+        if let (Some(at), Some(error)) = (&places.points_um, pitch_error)
+            && error.slope() > PITCH_ERROR_SLOPE_MAX
+        {
+            let expected = format!(
+                "at most {PITCH_ERROR_SLOPE_MAX} mm/mm from point to point (here {:.4})",
+                error.slope()
+            );
+            return Err(refuse(at.clone(), expected));
+        }
+    }
     for touch in file.probe.iter().flat_map(|probe| &probe.boxes) {
         let high_mm = touch.high_mm.each_ref().map(|high_mm| high_mm.0);
         for (low_mm, high_mm) in touch.low_mm.iter().zip(high_mm) {
@@ -171,8 +195,10 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine<AXES_MAX>, M
         axes: settings.each_ref().map(|axis| Some(axis.guard_figures(tick_s))),
         reactions: faults.reactions(tick_s),
     };
-    let config =
-        AxesConfig::<f32, AXES_MAX>::new(&figures, tick_s).and_then(|axes| axes.guarded(&guards, tick_s));
+    let compensation = Compensation { axes: settings.each_ref().map(|axis| axis.compensation) };
+    let config = AxesConfig::<f32, AXES_MAX>::new(&figures, tick_s)
+        .and_then(|axes| axes.guarded(&guards, tick_s))
+        .and_then(|axes| axes.compensated(&compensation, tick_s));
     if let Err(error) = config {
         let (places, axis) = &axes[error.axis];
         let cause = error.cause;
@@ -208,6 +234,8 @@ struct Places {
     low_mm: Option<Range<usize>>,
     homing: Option<HomingPlaces>,
     error_at_rest_mm: Option<Range<usize>>,
+    take_up_s: Option<Range<usize>>,
+    points_um: Option<Range<usize>>,
 }
 
 struct HomingPlaces {
@@ -262,6 +290,7 @@ struct AxisTable {
     encoder: EncoderTable,
     output: OutputTable,
     regulator: RegulatorTable,
+    compensation: Option<CompensationTable>,
     homing: Option<HomingTable>,
     drive: DriveTable,
 }
@@ -479,6 +508,73 @@ impl InverseTable {
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
+struct CompensationTable {
+    backlash: Option<BacklashTable>,
+    pitch_error: Option<PitchErrorTable>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct BacklashTable {
+    play_mm: Within<Play>,
+    take_up_s: Spanned<Within<Watch>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PitchErrorTable {
+    start_mm: Within<Coordinate>,
+    spacing_mm: Within<Spacing>,
+    points_um: Spanned<Points>,
+    #[serde(default)]
+    repeats: Repeats,
+}
+
+impl CompensationTable {
+    /// None where neither is there.
+    fn compensation(&self) -> Option<AxisCompensation> {
+        let backlash = self.backlash.as_ref().map(|backlash| Backlash {
+            play_mm: backlash.play_mm.0,
+            take_up_s: backlash.take_up_s.get_ref().0,
+        });
+        let pitch_error = self.pitch_error.as_ref().and_then(|error| {
+            // As many points as a table has, each within its range.
+            let Points(points_um) = error.points_um.get_ref();
+            PitchError::new(error.start_mm.0, error.spacing_mm.0, points_um, error.repeats.0)
+        });
+        (backlash.is_some() || pitch_error.is_some()).then_some(AxisCompensation { backlash, pitch_error })
+    }
+}
+
+/// The points of a pitch error.
+struct Points(Vec<f64>);
+
+impl<'de> Deserialize<'de> for Points {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let points = Vec::<Within<PitchErrorPoint>>::deserialize(deserializer)?;
+        match points.len() {
+            2..=COMPENSATION_POINTS_MAX => Ok(Self(points.iter().map(|point| point.0).collect())),
+            count => {
+                Err(D::Error::custom(format!("{count} points_um, expected 2 to {COMPENSATION_POINTS_MAX}")))
+            }
+        }
+    }
+}
+
+/// Whether a table repeats.
+#[derive(Default)]
+struct Repeats(bool);
+
+impl<'de> Deserialize<'de> for Repeats {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let value = toml::Value::deserialize(deserializer)?;
+        let refused = || D::Error::custom(format!("repeats = {value}, expected {REPEATS}"));
+        value.as_bool().map(Self).ok_or_else(refused)
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
 struct HomingTable {
     search_mm_s: Spanned<Within<Velocity>>,
     approach_mm_s: Spanned<Within<Limit>>,
@@ -552,6 +648,7 @@ struct DriveTable {
     coulomb_friction_mm_s2: Within<Gain>,
     viscous_friction_per_s: Within<Gain>,
     bed: Option<BedTable>,
+    screw: Option<ScrewTable>,
 }
 
 #[derive(Deserialize)]
@@ -560,6 +657,27 @@ struct BedTable {
     frequency_hz: Within<Positive>,
     damping_ratio: Within<Gain>,
     mass_ratio: Within<Positive>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ScrewTable {
+    pitch_mm: Within<Length>,
+    pitch_error_um: Option<Within<Amplitude>>,
+    pitch_phase_deg: Option<Within<Angle>>,
+    backlash_mm: Option<Within<PlayOrNone>>,
+}
+
+impl ScrewTable {
+    fn parameters(&self) -> ScrewParameters {
+        let amplitude_mm = self.pitch_error_um.as_ref().map_or(0.0, |error_um| error_um.0) * 1e-3;
+        let phase_rad = self.pitch_phase_deg.as_ref().map_or(0.0, |phase_deg| phase_deg.0).to_radians();
+        let error = PitchErrorParameters { pitch_mm: self.pitch_mm.0, amplitude_mm, phase_rad };
+        ScrewParameters {
+            pitch_error: (amplitude_mm > 0.0).then_some(error),
+            backlash_mm: self.backlash_mm.as_ref().map_or(0.0, |play_mm| play_mm.0),
+        }
+    }
 }
 
 impl PathTable {
@@ -599,7 +717,12 @@ impl AxisTable {
                 Some((every_mm.get_ref().0, every_mm.span()))
             }),
         });
+        let compensation = self.compensation.as_ref();
+        let backlash = compensation.and_then(|compensation| compensation.backlash.as_ref());
+        let error = compensation.and_then(|compensation| compensation.pitch_error.as_ref());
         Places {
+            take_up_s: backlash.map(|backlash| backlash.take_up_s.span()),
+            points_um: error.map(|error| error.points_um.span()),
             homing,
             lead_s: self.regulator.feedforward_lead_s.as_ref().map(Spanned::span),
             inverse_integral_time_s: inverse.map(|inverse| inverse.integral_time_s.span()),
@@ -654,8 +777,10 @@ impl AxisTable {
                 },
                 drive: self.regulator.inverse.as_ref().map(InverseTable::drive),
             },
+            compensation: self.compensation.as_ref().and_then(CompensationTable::compensation),
             homing: self.homing.as_ref().map(|homing| homing.settings(mm_per_count)),
             drive: self.drive.parameters(),
+            screw: self.drive.screw.as_ref().map_or_else(ScrewParameters::default, ScrewTable::parameters),
         }
     }
 }

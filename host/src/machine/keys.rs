@@ -8,12 +8,12 @@ use motion_kernel::axis::TABLE_POINTS;
 
 use super::law_name::LAW_NAMES;
 use super::range::{
-    AXIS_LETTER, AXIS_NAME, BlendTolerance, COOLANT_KINDS, Coordinate, CornerAngle, CurveShare, Damping,
-    DeadTime, EMERGENCY_STOP, ErrorGrowth, FeedforwardGain, FollowingError, Friction, Gain, Inertia,
-    IntegralTime, InverseGain, Jump, JunctionAngle, Lag, LeadTime, Length, LengthOrNone, Limit, Load,
-    MassRatio, NOISE_COUNTS, NOISE_SEED, OutputLimit, OutputOffset, PATH_MODE, Place, Positive, Ramp, Range,
-    Resolution, Reversal, SPINDLE_TURNS, SUBROUTINE, SpindleSpeed, SpindleTime, StopTime, TIMER_BITS,
-    TablePoint, Tick, Velocity, Watch,
+    AXIS_LETTER, AXIS_NAME, Amplitude, Angle, BlendTolerance, COOLANT_KINDS, Coordinate, CornerAngle,
+    CurveShare, Damping, DeadTime, EMERGENCY_STOP, ErrorGrowth, FeedforwardGain, FollowingError, Friction,
+    Gain, Inertia, IntegralTime, InverseGain, Jump, JunctionAngle, Lag, LeadTime, Length, LengthOrNone,
+    Limit, Load, MassRatio, NOISE_COUNTS, NOISE_SEED, OutputLimit, OutputOffset, PATH_MODE, PitchErrorPoint,
+    Place, Play, PlayOrNone, Positive, REPEATS, Ramp, Range, Resolution, Reversal, SPINDLE_TURNS, SUBROUTINE,
+    Spacing, SpindleSpeed, SpindleTime, StopTime, TIMER_BITS, TablePoint, Tick, Velocity, Watch,
 };
 
 /// A table of the file with its keys, without its tables.
@@ -36,8 +36,10 @@ pub struct Key {
     pub name: &'static str,
     /// Unit of its value; "1" for a number without one, empty for what is no number.
     pub unit: &'static str,
-    /// How many values it has.
+    /// How many values it has, or the fewest.
     pub values: usize,
+    /// Whether it may have more.
+    pub may_be_more: bool,
     /// The range of a value, in the words of refusals.
     pub range: &'static str,
     /// The value if the key is left out; none if it is required.
@@ -48,7 +50,7 @@ pub struct Key {
 
 impl Key {
     const fn new(name: &'static str, unit: &'static str, range: &'static str, meaning: &'static str) -> Self {
-        Self { name, unit, values: 1, range, default: None, meaning }
+        Self { name, unit, values: 1, may_be_more: false, range, default: None, meaning }
     }
 
     const fn or(self, default: &'static str) -> Self {
@@ -467,6 +469,45 @@ pub const KEY_TABLES: &[KeyTable] = &[
         ],
     ),
     optional(
+        "axis.compensation.backlash",
+        "Play between motor and load, taken up when the direction changes.",
+        &[
+            Key::new("play_mm", "mm", Play::EXPECTED, "What the motor turns back before the load follows."),
+            Key::new(
+                "take_up_s",
+                "s",
+                Watch::EXPECTED,
+                "How long that takes; so long that the motor needs at most feed_mm_s and half of the acceleration that the \
+                 drive has.",
+            ),
+        ],
+    ),
+    optional(
+        "axis.compensation.pitch_error",
+        "The screw's error over its travel: where the load is, less where the motor is.",
+        &[
+            Key::new("start_mm", "mm", Coordinate::EXPECTED, "Where the first point lies."),
+            Key::new("spacing_mm", "mm", Spacing::EXPECTED, "Distance from point to point."),
+            Key {
+                values: 2,
+                may_be_more: true,
+                ..Key::new(
+                    "points_um",
+                    "µm",
+                    PitchErrorPoint::EXPECTED,
+                    "Errors at 2 to 32 points, a smooth curve between them; at most 0.02 mm/mm from one to the next.",
+                )
+            },
+            Key::new(
+                "repeats",
+                "",
+                REPEATS,
+                "Whether the first point follows the last one again, turn by turn; else the ends hold beyond them.",
+            )
+            .or("false"),
+        ],
+    ),
+    optional(
         "axis.homing",
         "How the axis finds its reference, `motion home`: a home switch, and an index pulse where there is one.",
         &[
@@ -555,6 +596,22 @@ pub const KEY_TABLES: &[KeyTable] = &[
             Key::new("frequency_hz", "Hz", Positive::EXPECTED, "Natural frequency of the bed alone."),
             Key::new("damping_ratio", "1", Gain::EXPECTED, "Fraction of critical damping."),
             Key::new("mass_ratio", "1", Positive::EXPECTED, "Moving mass over the bed's modal mass."),
+        ],
+    ),
+    optional(
+        "axis.drive.screw",
+        "Errors of the simulated screw between motor and load: the encoder reads the motor.",
+        &[
+            Key::new("pitch_mm", "mm", Length::EXPECTED, "Travel of a turn."),
+            Key::new(
+                "pitch_error_um",
+                "µm",
+                Amplitude::EXPECTED,
+                "Amplitude of load − motor, a sine over every turn; 0 for none.",
+            )
+            .or("0"),
+            Key::new("pitch_phase_deg", "°", Angle::EXPECTED, "Its phase at the motor's position 0.").or("0"),
+            Key::new("backlash_mm", "mm", PlayOrNone::EXPECTED, "Play between motor and load; 0 for none.").or("0"),
         ],
     ),
 ];

@@ -38,6 +38,8 @@ pub(super) const SPINDLE_TURNS: &str = "\"both\" or \"clockwise\"";
 pub(super) const COOLANT_KINDS: &str = "\"both\", \"flood\" or \"mist\"";
 /// Names of a subroutine, or none.
 pub(super) const SUBROUTINE: &str = "letters, digits, '-' and '_', or \"\" for none";
+/// Whether a table repeats.
+pub(super) const REPEATS: &str = "true or false";
 /// Seeds of an encoder's noise.
 pub(super) const NOISE_SEED: &str = "a whole number, 0 or more";
 
@@ -95,6 +97,12 @@ ranges! {
     LengthOrNone: "a number from 0 to 100000", |value| (0.0..=1e5).contains(&value);
     Place: "a number from -100000 to 100000", |value| value.abs() <= 1e5;
     MassRatio: "a number from 1e-6 to 100", |value| (1e-6..=100.0).contains(&value);
+    Play: "a number above 0, at most 1", |value| value > 0.0 && value <= 1.0;
+    PlayOrNone: "a number from 0 to 1", |value| (0.0..=1.0).contains(&value);
+    Spacing: "a number from 0.01 to 1000", |value| (0.01..=1000.0).contains(&value);
+    PitchErrorPoint: "a number from -300 to 300", |value| value.abs() <= 300.0;
+    Amplitude: "a number from 0 to 300", |value| (0.0..=300.0).contains(&value);
+    Angle: "a number from -360 to 360", |value| value.abs() <= 360.0;
     Inertia: "a number above -1, at most 1000", |value| value > -1.0 && value <= 1000.0;
 }
 
@@ -189,6 +197,12 @@ mod tests {
         words_are_the_range::<LengthOrNone>();
         words_are_the_range::<Place>();
         words_are_the_range::<MassRatio>();
+        words_are_the_range::<Play>();
+        words_are_the_range::<PlayOrNone>();
+        words_are_the_range::<Spacing>();
+        words_are_the_range::<PitchErrorPoint>();
+        words_are_the_range::<Amplitude>();
+        words_are_the_range::<Angle>();
         words_are_the_range::<Inertia>();
     }
 }

@@ -2,9 +2,12 @@
 
 use hal_sim::{
     AxisParameters, DriveParameters, EncoderNoise, EncoderParameters, HomeParameters, MachineParameters,
-    REFERENCE_TICK_S, REFERENCE_X, REFERENCE_Y, REFERENCE_Z, SUBSTEPS_MAX, TimerBits,
+    REFERENCE_TICK_S, REFERENCE_X, REFERENCE_Y, REFERENCE_Z, SUBSTEPS_MAX, ScrewParameters, TimerBits,
 };
-use motion_kernel::axis::{AxesConfig, AxesError, AxisFigures, Feedforward, Gains, GuardFigures, Guards};
+use motion_kernel::axis::{
+    AxesConfig, AxesError, AxisCompensation, AxisFigures, Compensation, Feedforward, Gains, GuardFigures,
+    Guards, TAKE_UP_PEAKS,
+};
 use motion_kernel::fault::{Reaction, Reactions};
 use motion_kernel::homing::HomingConfig;
 use motion_kernel::law::{Limits, Pulse};
@@ -193,10 +196,14 @@ pub struct AxisSettings {
     pub gains: Gains,
     /// Feedforward gains, within ±1000.
     pub feedforward: Feedforward,
+    /// What its screw needs, if it is compensated.
+    pub compensation: Option<AxisCompensation>,
     /// How it is homed, if it is.
     pub homing: Option<HomingSettings>,
     /// The simulated drive and its mechanics.
     pub drive: DriveParameters,
+    /// The simulated screw between motor and load.
+    pub screw: ScrewParameters,
 }
 
 /// How an axis is homed, and what the simulated one has for it.
@@ -398,6 +405,7 @@ impl<const N: usize> Machine<N> {
     pub fn axes_config<R: Real>(&self) -> Result<AxesConfig<R, N>, AxisError> {
         AxesConfig::new(&self.figures(), self.tick_s)
             .and_then(|axes| axes.guarded(&self.guards(), self.tick_s))
+            .and_then(|axes| axes.compensated(&self.compensation(), self.tick_s))
             .map_err(|error| self.at_axis(error))
     }
 
@@ -410,12 +418,20 @@ impl<const N: usize> Machine<N> {
         }
     }
 
+    /// The compensation of its axes.
+    #[must_use]
+    pub fn compensation(&self) -> Compensation<N> {
+        Compensation { axes: self.axes.each_ref().map(|axis| axis.compensation) }
+    }
+
     /// The kernel's axes without guards but the greatest following error.
     ///
     /// # Errors
     /// The first axis with a value that the kernel can't use.
     pub fn unguarded_axes_config<R: Real>(&self) -> Result<AxesConfig<R, N>, AxisError> {
-        AxesConfig::new(&self.figures(), self.tick_s).map_err(|error| self.at_axis(error))
+        AxesConfig::new(&self.figures(), self.tick_s)
+            .and_then(|axes| axes.compensated(&self.compensation(), self.tick_s))
+            .map_err(|error| self.at_axis(error))
     }
 
     fn figures(&self) -> [AxisFigures; N] {
@@ -502,8 +518,10 @@ impl AxisSettings {
                 jerk_s2: 2.231_850_25e-5,
                 ..Feedforward::default()
             },
+            compensation: None,
             homing: None,
             drive,
+            screw: ScrewParameters::default(),
         }
     }
 
@@ -524,6 +542,16 @@ impl AxisSettings {
     pub fn reachable_mm_s(&self) -> f64 {
         let volts = self.output_limit_v - self.output_offset_v.abs();
         self.mm_s_at_10_v.abs() * volts / DacCode::FULL_SCALE_V
+    }
+
+    /// The shortest time in which its motor may go through a play \[s\]: at most at its feed, and with half of the
+    /// acceleration that the drive has. The load stands meanwhile, so the axis' own limits of acceleration and jerk, which are
+    /// for what moves with it, do not bind it.
+    #[must_use]
+    pub fn take_up_s(&self, play_mm: f64) -> f64 {
+        let accel_mm_s2 = 0.5 * self.drive.accel_limit_mm_s2 / (1.0 + self.drive.load_inertia_ratio);
+        let [of_velocity, of_accel, _] = TAKE_UP_PEAKS;
+        (of_velocity * play_mm / self.feed_mm_s).max((of_accel * play_mm / accel_mm_s2).sqrt())
     }
 
     /// The axis in the kernel's terms.
@@ -584,6 +612,7 @@ impl AxisSettings {
     fn simulated(&self) -> AxisParameters {
         AxisParameters {
             drive: self.drive,
+            screw: self.screw,
             encoder: EncoderParameters {
                 resolution_mm: self.mm_per_count,
                 offset_counts: 0,

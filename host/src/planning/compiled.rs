@@ -4,9 +4,9 @@
 
 use core::array::from_fn;
 
-use motion_kernel::axis::Guards;
+use motion_kernel::axis::{Compensation, Guards};
 use motion_kernel::homing::HomingFigures;
-use motion_kernel::program::{Header, Item, write_homed};
+use motion_kernel::program::{Header, Item, write_compensated};
 
 use crate::machine::Machine;
 use crate::simulate::session::homing_figures;
@@ -56,7 +56,9 @@ pub(crate) fn bytes_of<'a, const N: usize, const M: usize>(
     let mut bytes = Vec::new();
     // Entries of nine axes fit the format.
     let (header, guards) = (header_of_axes(&machine.header()), guards_of_axes(&machine.guards()));
-    write_homed(&header, &guards, &homing_of_axes(machine), &items, &mut bytes).expect("nine axes at most");
+    let (homing, compensation) = (homing_of_axes(machine), compensation_of_axes(&machine.compensation()));
+    write_compensated(&header, &guards, &homing, &compensation, &items, &mut bytes)
+        .expect("nine axes at most");
     bytes
 }
 
@@ -68,6 +70,10 @@ pub(crate) fn header_of_axes<const N: usize, const M: usize>(header: &Header<N>)
 
 fn guards_of_axes<const N: usize, const M: usize>(guards: &Guards<N>) -> Guards<M> {
     Guards { axes: from_fn(|axis| guards.axes[axis]), reactions: guards.reactions }
+}
+
+fn compensation_of_axes<const N: usize, const M: usize>(compensation: &Compensation<N>) -> Compensation<M> {
+    Compensation { axes: from_fn(|axis| compensation.axes[axis]) }
 }
 
 /// How the first `M` axes are homed.

@@ -6,12 +6,12 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | `MREC` |
-//! | 1 | version of this format, 5 |
+//! | 1 | version of this format, 6 |
 //! | 1 | places for axes, 3 or 9: [`places`] |
 //! | … | [`Recording`] in the [postcard](https://postcard.jamesmunns.com) wire format |
 //! | 4 | CRC-32 (ISO-HDLC) of all before it, least significant byte first |
 //!
-//! A [`Recording`] holds, in this order: the [`Job`], which is the number type, machine and guards as the kernel knows them,
+//! A [`Recording`] holds, in this order: the [`Job`], which is the number type, machine, guards and compensation as the kernel knows them,
 //! the program's items with the blocks of its path, the learnt correction and the commands as text, if there are any, and
 //! what a report shows of the run, with the letters of the axes in the first places; the counts before the first tick; and
 //! the answers of every tick, some eight bytes each on three places ([`answers`]).
@@ -40,7 +40,7 @@ use self::answers::RecordedAnswers;
 use crate::simulate::{Job, Number};
 
 const MAGIC: [u8; 4] = *b"MREC";
-const VERSION: u8 = 5;
+const VERSION: u8 = 6;
 
 /// A recorded run of a machine with `N` places for axes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -155,7 +155,7 @@ fn recorded_answers_read_what_was_written() {
 /// A field more or less of what the kernel consumes is another format, and needs another version.
 #[test]
 fn the_format_has_these_lengths() {
-    let Job { header, guards, .. } = recorded(Number::F32).job;
+    let Job { header, guards, compensation, .. } = recorded(Number::F32).job;
     let still = [Position::ZERO; 3];
     let limits = Machine::reference().path.limits();
     let allowed = Allowed { cap_mm_s: 1.0, limits };
@@ -174,9 +174,10 @@ fn the_format_has_these_lengths() {
     let found = (
         length(postcard::to_stdvec(&header)),
         length(postcard::to_stdvec(&guards)),
+        length(postcard::to_stdvec(&compensation)),
         items.map(|item| length(postcard::to_stdvec(&item))),
     );
-    assert_eq!((VERSION, found), (5, (360, 206, [30, 174, 51, 4, 6, 1, 12, 82])));
+    assert_eq!((VERSION, found), (6, (360, 206, 3, [30, 174, 51, 4, 6, 1, 12, 82])));
 }
 
 #[test]
@@ -190,7 +191,7 @@ fn strangers_are_named() {
     );
     let mut newer = bytes.clone();
     newer[4] = 9;
-    assert_eq!(message(&newer), "found a recording of format 9, expected format 5");
+    assert_eq!(message(&newer), "found a recording of format 9, expected format 6");
     assert!(message(&bytes[..bytes.len() - 1]).contains("damaged or not whole"));
 
     // With a checksum that fits.

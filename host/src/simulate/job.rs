@@ -3,7 +3,7 @@
 //! Consumes a [`Plan`] and a [`Machine`]; produces a [`Job`]: everything that the kernel of a run consumes
 //! but the answers of its hardware. Fails where the plan or the machine can't be executed in the number type.
 
-use motion_kernel::axis::{AxesConfig, Guards};
+use motion_kernel::axis::{AxesConfig, Compensation, Guards};
 use motion_kernel::num::{Fixed, Real};
 use motion_kernel::program::{Header, Item};
 use serde::{Deserialize, Serialize};
@@ -70,6 +70,8 @@ pub struct Job<const N: usize = 3> {
     pub header: Header<N>,
     /// How its faults are told and end.
     pub guards: Guards<N>,
+    /// What its screws need.
+    pub compensation: Compensation<N>,
     /// The program, with the blocks of its path.
     pub items: Vec<Item<N>>,
     /// What was learnt of one of its stretches.
@@ -247,6 +249,7 @@ impl<const N: usize> Job<N> {
             number: options.number,
             header: machine.header(),
             guards: if options.is_unguarded { machine.guards().limits_only() } else { machine.guards() },
+            compensation: machine.compensation(),
             items: executable.items,
             correction: options.correction.cloned(),
             script: options.script.cloned(),
@@ -278,6 +281,7 @@ impl<const N: usize> Job<N> {
         let tick_s = self.header.tick_s;
         let axes = AxesConfig::new(&self.header.axes, tick_s);
         axes.and_then(|axes| axes.guarded(&self.guards, tick_s))
+            .and_then(|axes| axes.compensated(&self.compensation, tick_s))
             .map_err(|error| AxisError { axis: self.info.name_of(error.axis), source: error.cause })
     }
 }

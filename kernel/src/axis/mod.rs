@@ -8,6 +8,7 @@
 //! - `feedforward`: F_V, F_a, F_J of S4 (1), and the inverse of the drive;
 //! - `regulator`: S4 (1), P(ID) on the following error plus feedforward, with saturation and anti-windup;
 //! - `correction`: the learnt correction of a stretch, added to feedforward;
+//! - `compensation`: a screw's pitch error and backlash (feature `compensation`);
 //! - `guard`: whether encoder, drive and set-point make sense together (feature `guards`).
 //!
 //! Configuration ([`AxesConfig`], [`AxisConfig`]) is immutable and separate from state ([`AxisState`]), so
@@ -38,6 +39,8 @@
 //! ```
 
 mod check;
+#[cfg(feature = "compensation")]
+mod compensation;
 mod correction;
 pub(crate) mod feedforward;
 #[cfg(feature = "guards")]
@@ -50,6 +53,13 @@ mod preview;
 mod regulator;
 mod scale;
 
+#[cfg(feature = "compensation")]
+pub use compensation::{
+    AxisCompensation, BACKLASH_MM_MAX, Backlash, COMPENSATION_POINTS_MAX, Compensation,
+    PITCH_ERROR_SLOPE_MAX, PITCH_ERROR_SPACING_MM, PITCH_ERROR_UM_MAX, PitchError, TAKE_UP_PEAKS,
+};
+#[cfg(feature = "compensation")]
+use compensation::{CompensationConfig, CompensationState};
 pub use correction::{Correction, CorrectionError, KNOT_TICKS_MAX};
 pub use feedforward::{
     BED_TICK_SHARE_MAX, BedInverse, DriveInverse, Feedforward, TABLE_POINTS, Table, Tables,
@@ -105,6 +115,8 @@ pub struct AxisConfig<R> {
     /// Following error above which the axis faults \[mm\].
     pub following_error_limit_mm: R,
     guard: GuardConfig<R>,
+    #[cfg(feature = "compensation")]
+    compensation: Option<CompensationConfig<R>>,
 }
 
 /// The configuration of all axes of a machine, fixed while they run.
@@ -198,6 +210,8 @@ impl<R: Real> AxisConfig<R> {
             ),
             following_error_limit_mm: R::from_f64(limit_mm),
             guard: GuardConfig::limit_only(limit_mm),
+            #[cfg(feature = "compensation")]
+            compensation: None,
         }
     }
 
@@ -210,13 +224,15 @@ impl<R: Real> AxisConfig<R> {
 /// The state of an axis, which changes from tick to tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AxisState<R> {
-    /// Added to the encoder's position: set by homing.
+    /// Added to the encoder's position for that of the load: set by homing, and moved by compensation.
     pub offset: Position,
     /// The regulator's state.
     pub(crate) regulator: RegulatorState<R>,
     /// Largest |following error| since it was last cleared \[mm\].
     pub peak_following_error_mm: R,
     guard: Guard<R>,
+    #[cfg(feature = "compensation")]
+    compensation: CompensationState,
 }
 
 /// The outcome of one tick of an axis.
@@ -252,6 +268,8 @@ impl<R: Real> AxisState<R> {
     #[inline]
     pub(crate) fn refer(&mut self, config: &AxisConfig<R>, counts: Counts, position: Position) {
         self.offset = position - config.encoder.position(counts);
+        #[cfg(feature = "compensation")]
+        self.refer_load(config, position);
     }
 
     /// The actual position at the encoder's reading.
@@ -263,6 +281,11 @@ impl<R: Real> AxisState<R> {
     /// Resets the regulator and takes the actual position as the set position, which it returns.
     #[inline(never)]
     pub(crate) fn stand_here(&mut self, config: &AxisConfig<R>, output: &mut AxisOutput<R>) -> Position {
+        #[cfg(feature = "compensation")]
+        {
+            self.end_take_up();
+            self.find_load(config, output.counts);
+        }
         output.set = self.position(config, output.counts);
         self.regulator = RegulatorState::default();
         self.guard.stand_here();
@@ -282,6 +305,8 @@ impl<R: Real> AxisState<R> {
     #[inline]
     fn hold_still(&mut self, config: &AxisConfig<R>, output: &mut AxisOutput<R>) -> R {
         let AxisOutput { counts, set, .. } = *output;
+        #[cfg(feature = "compensation")]
+        self.follow_load(config, counts);
         let actual = self.position(config, counts);
         *output = AxisOutput {
             counts,
@@ -305,6 +330,19 @@ impl<R: Real> AxisState<R> {
     // Not inlined: three copies of it would fight for the registers.
     #[inline(never)]
     pub fn tick(&mut self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, output: &mut AxisOutput<R>) {
+        #[cfg(feature = "compensation")]
+        if let Some(compensation) = &config.compensation {
+            let motor = self.compensate(compensation, setpoint, output.set);
+            return self.regulate(config, &motor, output);
+        }
+        self.regulate(config, setpoint, output);
+    }
+
+    /// The tick but for compensation.
+    // Once in the image, whoever calls it.
+    #[cfg_attr(feature = "compensation", inline(never))]
+    #[cfg_attr(not(feature = "compensation"), inline)]
+    fn regulate(&mut self, config: &AxisConfig<R>, setpoint: &Setpoint<R>, output: &mut AxisOutput<R>) {
         let actual = self.position(config, output.counts);
         // Subtracted in fixed point, converted afterwards.
         let following_error_mm: R = (output.set - actual).to_offset();

@@ -31,6 +31,10 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         }
         let before = state.offset;
         state.refer(config, counts, position);
+        #[cfg(feature = "compensation")]
+        if let Some(output) = self.trace.axes.get(axis) {
+            state.find_load(config, output.counts);
+        }
         let shift = state.offset - before;
         let (set_of_axis, output) = (set.get_mut(axis)?, self.trace.axes.get_mut(axis)?);
         *set_of_axis = *set_of_axis + shift;

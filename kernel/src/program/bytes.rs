@@ -3,10 +3,10 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | `MOTN` |
-//! | 1 | version of this format, 6 |
+//! | 1 | version of this format: 6, or 7 of a machine with compensation |
 //! | 1 | number of axes |
-//! | 2 | length of the guards and of homing, least significant byte first; 0 for none |
-//! | … | [`Guards`] in the [postcard](https://postcard.jamesmunns.com) wire format, and behind them, if any axis is homed, `HomingFigures`; a kernel without guards skips both |
+//! | 2 | length of guards, homing and compensation together, least significant byte first; 0 for none |
+//! | … | [`Guards`] in the [postcard](https://postcard.jamesmunns.com) wire format, and behind them, if any axis is homed or compensated, `HomingFigures`; a kernel without guards skips both. Behind them, in format 7, `Compensation`; a kernel without compensation does not read that format |
 //! | … | [`Header`], in the same format |
 //! | … | [`Item`]s to the end, each [as few bytes](super::compact) |
 //! | 4 | CRC-32 (ISO-HDLC, the one of zip and Ethernet) of all before it, least significant byte first |
@@ -20,6 +20,8 @@ use serde::{Deserialize, Serialize};
 use super::checksum::Checksum;
 use super::compact::{Decoder, Encoder};
 use super::{Item, wire};
+#[cfg(feature = "compensation")]
+use crate::axis::Compensation;
 use crate::axis::{AxisFigures, Guards};
 #[cfg(all(feature = "live", feature = "guards"))]
 use crate::homing::HomingFigures;
@@ -30,6 +32,8 @@ use crate::units::Position;
 const MAGIC: [u8; 4] = *b"MOTN";
 /// The version of this format, and of the items in it.
 pub const FORMAT: u8 = 6;
+/// The version of a program of a machine with compensation: a kernel that has none would drive it wrong.
+const FORMAT_COMPENSATED: u8 = 7;
 const PREFIX: usize = MAGIC.len() + 2;
 /// Axes of the largest machine.
 const AXES_MAX: usize = 9;
@@ -63,7 +67,7 @@ pub enum ProgramError {
     NotAProgram,
     /// It has another version of the format.
     Version {
-        /// Its version; 6 is expected.
+        /// Its version; 6 is expected, or 7 by a kernel with compensation.
         found: u8,
     },
     /// It is for a machine with another number of axes.
@@ -91,7 +95,12 @@ impl core::fmt::Display for ProgramError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::NotAProgram => write!(f, "no compiled program: expected MOTN at its start"),
-            Self::Version { found } => write!(f, "format {found}, expected {FORMAT}"),
+            Self::Version { found } if cfg!(feature = "compensation") => {
+                write!(f, "format {found}, expected {FORMAT} or {FORMAT_COMPENSATED}")
+            }
+            Self::Version { found } => {
+                write!(f, "format {found}, expected {FORMAT}, of a machine without compensation")
+            }
             Self::Axes { found, expected } => write!(f, "a program for {found} axes, expected {expected}"),
             Self::Checksum { found, expected } => {
                 write!(f, "damaged: checksum {found:08x}, expected {expected:08x}")
@@ -119,7 +128,7 @@ pub fn write<'a, const AXES: usize>(
         Some(guards) => &*postcard::to_slice(guards, &mut entry)?,
         None => &[],
     };
-    write_guarded(header, guards, items, out)
+    write_guarded(FORMAT, header, guards, items, out)
 }
 
 /// [`write`](write()) with guards, and how the axes are homed.
@@ -141,11 +150,33 @@ pub fn write_homed<'a, const AXES: usize>(
     let length = postcard::to_slice(guards, &mut entry)?.len();
     let behind = entry.get_mut(length..).unwrap_or_default();
     let length = length + postcard::to_slice(homing, behind)?.len();
-    write_guarded(header, entry.get(..length).unwrap_or_default(), items, out)
+    write_guarded(FORMAT, header, entry.get(..length).unwrap_or_default(), items, out)
+}
+
+/// [`write_homed`] with the compensation of the axes.
+///
+/// # Errors
+/// See [`write`](write()).
+#[cfg(feature = "compensation")]
+pub fn write_compensated<'a, const AXES: usize>(
+    header: &Header<AXES>,
+    guards: &Guards<AXES>,
+    homing: &HomingFigures<AXES>,
+    compensation: &Compensation<AXES>,
+    items: impl IntoIterator<Item = &'a Item<AXES>>,
+    out: &mut impl Extend<u8>,
+) -> Result<(), postcard::Error> {
+    if *compensation == Compensation::NONE {
+        return write_homed(header, guards, homing, items, out);
+    }
+    let mut entry = [0; ENTRY_MAX];
+    let length = postcard::to_slice(&(guards, homing, compensation), &mut entry)?.len();
+    write_guarded(FORMAT_COMPENSATED, header, entry.get(..length).unwrap_or_default(), items, out)
 }
 
 /// Writes with guards that are written already.
 fn write_guarded<'a, const AXES: usize>(
+    format: u8,
     header: &Header<AXES>,
     guards: &[u8],
     items: impl IntoIterator<Item = &'a Item<AXES>>,
@@ -161,7 +192,7 @@ fn write_guarded<'a, const AXES: usize>(
     };
     let mut entry = [0; ENTRY_MAX];
     put(&MAGIC);
-    put(&[FORMAT, AXES as u8]);
+    put(&[format, AXES as u8]);
     // An entry is shorter than 2¹⁶ bytes.
     put(&(guards.len() as u16).to_le_bytes());
     put(guards);
@@ -182,6 +213,8 @@ pub struct Reader<'a, const AXES: usize> {
     header: Header<AXES>,
     #[cfg(feature = "guards")]
     guards: &'a [u8],
+    #[cfg(feature = "compensation")]
+    is_compensated: bool,
     items: &'a [u8],
     /// Where the items end, from the start of the program.
     end: usize,
@@ -212,7 +245,8 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
         if *magic != MAGIC {
             return Err(ProgramError::NotAProgram);
         }
-        if version != FORMAT {
+        let is_compensated = cfg!(feature = "compensation") && version == FORMAT_COMPENSATED;
+        if version != FORMAT && !is_compensated {
             return Err(ProgramError::Version { found: version });
         }
         if usize::from(axes) != AXES {
@@ -232,6 +266,8 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
             header,
             #[cfg(feature = "guards")]
             guards: _guards,
+            #[cfg(feature = "compensation")]
+            is_compensated,
             items: left,
             end: summed.len(),
             #[cfg(feature = "link")]
@@ -272,7 +308,34 @@ impl<'a, const AXES: usize> Reader<'a, AXES> {
         let behind = wire::take::<Guards<AXES>>(self.guards).map(|(_, behind)| behind);
         match behind.map(|behind| (behind.is_empty(), wire::take(behind))) {
             Some((true, _)) => Ok(HomingFigures::NONE),
-            Some((false, Some((homing, [])))) => Ok(homing),
+            // Compensation may follow.
+            Some((false, Some((homing, rest)))) if rest.is_empty() != self.is_compensated() => Ok(homing),
+            _ => Err(ProgramError::Malformed { at: PREFIX + 2 }),
+        }
+    }
+
+    /// Whether an axis of the machine is compensated: never in a kernel without compensation, which refuses such programs.
+    #[must_use]
+    pub fn is_compensated(&self) -> bool {
+        #[cfg(feature = "compensation")]
+        return self.is_compensated;
+        #[cfg(not(feature = "compensation"))]
+        false
+    }
+
+    /// The compensation of the machine's axes.
+    ///
+    /// # Errors
+    /// The bytes in its place are something else.
+    #[cfg(feature = "compensation")]
+    pub fn compensation(&self) -> Result<Compensation<AXES>, ProgramError> {
+        if !self.is_compensated {
+            return Ok(Compensation::NONE);
+        }
+        let behind_guards = wire::take::<Guards<AXES>>(self.guards).map(|(_, behind)| behind);
+        let behind = behind_guards.and_then(wire::take::<HomingFigures<AXES>>).map(|(_, behind)| behind);
+        match behind.and_then(wire::take) {
+            Some((compensation, [])) => Ok(compensation),
             _ => Err(ProgramError::Malformed { at: PREFIX + 2 }),
         }
     }
@@ -388,6 +451,42 @@ mod tests {
         assert_ne!(of(&other), of(&bytes));
     }
 
+    /// Guards, homing and compensation lie behind each other; without compensation the bytes are those without the feature.
+    #[cfg(feature = "compensation")]
+    #[test]
+    fn compensation_is_written_and_read() {
+        use crate::axis::{AxisCompensation, Backlash, PitchError};
+        let points: Vec<f64> = (0..32).map(|index| 3.0 * f64::from(index) - 47.11).collect();
+        let pitch_error = PitchError::new(-80.5, 12.25, &points, false);
+        assert!(pitch_error.is_some());
+        let backlash = Some(Backlash { play_mm: 0.0125, take_up_s: 0.007 });
+        let compensation = Compensation { axes: [None, Some(AxisCompensation { backlash, pitch_error })] };
+        let mut bytes = Vec::new();
+        let (homing, (items, without)) = (HomingFigures::NONE, program());
+        write_compensated(&header(), &guards(), &homing, &compensation, &items, &mut bytes).expect("short");
+        let reader = Reader::<2>::new(&bytes).expect("a program");
+        assert!(reader.is_compensated());
+        assert_eq!(reader.compensation(), Ok(compensation));
+        assert_eq!((reader.guards(), reader.homing()), (Ok(Some(guards())), Ok(homing)));
+        assert_eq!(*reader.header(), header());
+        assert_eq!(reader.items().collect::<Result<Vec<_>, _>>(), Ok(items.clone()));
+        let mut again = Vec::new();
+        write_compensated(&header(), &guards(), &homing, &Compensation::NONE, &items, &mut again)
+            .expect("short");
+        assert_eq!(again, without);
+        let reader = Reader::<2>::new(&again).expect("a program");
+        assert_eq!((reader.is_compensated(), reader.compensation()), (false, Ok(Compensation::NONE)));
+        // Of the other format either has too much, or too little.
+        for (mut bytes, format) in [(bytes, FORMAT), (without, FORMAT_COMPENSATED)] {
+            bytes[MAGIC.len()] = format;
+            bytes.truncate(bytes.len() - 4);
+            bytes.extend(Checksum::of(&bytes).to_le_bytes());
+            let reader = Reader::<2>::new(&bytes).expect("a program");
+            let found = reader.homing().map(|_| ()).and(reader.compensation().map(|_| ()));
+            assert_eq!(found, Err(ProgramError::Malformed { at: PREFIX + 2 }), "format {format}");
+        }
+    }
+
     /// Entries are longest with every figure there and every number at its longest.
     #[test]
     fn nine_axes_fit_and_ten_are_refused() {
@@ -416,6 +515,32 @@ mod tests {
             let item =
                 Item::Septic { line: u32::MAX, start: far, coefficients: [[1.0; 7]; AXES], length: far[0] };
             let mut bytes = Vec::new();
+            #[cfg(feature = "compensation")]
+            {
+                use crate::axis::{AxisCompensation, Backlash, PitchError};
+                use crate::homing::{AxisHoming, HomingConfig};
+                use crate::jog::Direction;
+                let config = HomingConfig {
+                    direction: Direction::Negative,
+                    fast_mm_s: 1.0,
+                    slow_mm_s: 1.0,
+                    travel_mm: 1.0,
+                    back_off_mm: 1.0,
+                    index_mm: Some(1.0),
+                    position: far[0],
+                    park: Some(far[0]),
+                };
+                let homing = AxisHoming { config, feed_mm_s: 1.0, limits: RULES.limits };
+                let homing = HomingFigures { axes: [Some(homing); AXES] };
+                let compensation = AxisCompensation {
+                    backlash: Some(Backlash { play_mm: 0.1, take_up_s: 0.1 }),
+                    pitch_error: PitchError::new(0.1, 0.1, &[-300.0; 32], true),
+                };
+                let compensation = Compensation { axes: [Some(compensation); AXES] };
+                write_compensated(&header, &guards, &homing, &compensation, &[item], &mut bytes)
+                    .map(|()| bytes.len())
+            }
+            #[cfg(not(feature = "compensation"))]
             write(&header, Some(&guards), &[item], &mut bytes).map(|()| bytes.len())
         }
         assert!(longest::<9>(axis).is_ok_and(|bytes| bytes > 2000));

@@ -47,6 +47,8 @@ pub(crate) mod supply;
 mod switching;
 mod wire;
 
+#[cfg(feature = "compensation")]
+pub use bytes::write_compensated;
 #[cfg(all(feature = "live", feature = "guards"))]
 pub use bytes::write_homed;
 pub use bytes::{FORMAT, Header, Items, ProgramError, Reader, write};
