@@ -146,7 +146,9 @@ fn a_kink_that_is_passed_is_told() {
     let (kinked, straight) = (of("X40 Y0.08"), of("X40"));
     let step_mm_s = 50.0 * 0.004;
     println!("{kinked} mm/s, expected {step_mm_s}; without a kink {straight}");
-    assert!((kinked - step_mm_s).abs() < 1e-3 * step_mm_s && straight < 1e-6);
+    // The mean of two accelerations misses snap times the tick cubed over 12.
+    let missed_mm_s = 4.0e5 * 0.0005_f64.powi(3) / 12.0;
+    assert!((kinked - step_mm_s).abs() < 1e-3 * step_mm_s && straight <= 1.001 * missed_mm_s);
 }
 
 #[test]
