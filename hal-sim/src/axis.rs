@@ -9,6 +9,7 @@ use crate::drive::{DriveModel, DriveState};
 use crate::drive_parameters::{DriveParameters, REFERENCE_X, REFERENCE_Y, REFERENCE_Z};
 use crate::encoder::{EncoderParameters, REFERENCE_ENCODER, SimEncoder};
 use crate::parameter::{ParameterError, finite};
+#[cfg(feature = "screw")]
 use crate::screw::{Screw, ScrewParameters};
 
 /// Velocity of the reference axes per volt \[mm/s/V\]: 20 m/min at 10 V (S4).
@@ -19,7 +20,8 @@ pub const REFERENCE_MM_S_PER_VOLT: f64 = 20_000.0 / 60.0 / 10.0;
 pub struct AxisParameters {
     /// Drive and mechanics.
     pub drive: DriveParameters,
-    /// The errors of the screw between motor and load.
+    /// The errors of the screw between motor and load (feature `screw`).
+    #[cfg(feature = "screw")]
     pub screw: ScrewParameters,
     /// Position feedback, of the motor.
     pub encoder: EncoderParameters,
@@ -40,6 +42,7 @@ impl AxisParameters {
     const fn reference(drive: DriveParameters) -> Self {
         Self {
             drive,
+            #[cfg(feature = "screw")]
             screw: ScrewParameters { pitch_error: None, backlash_mm: 0.0 },
             encoder: REFERENCE_ENCODER,
             mm_s_per_volt: REFERENCE_MM_S_PER_VOLT,
@@ -53,6 +56,7 @@ impl AxisParameters {
 pub struct SimAxis<const LINE: usize> {
     model: DriveModel,
     state: DriveState<LINE>,
+    #[cfg(feature = "screw")]
     screw: Screw,
     encoder: SimEncoder,
     mm_s_per_volt: f64,
@@ -64,7 +68,7 @@ impl<const LINE: usize> SimAxis<LINE> {
     /// # Errors
     /// The first parameter that cannot be simulated.
     pub fn new(parameters: AxisParameters, tick_s: f64, substeps: u32) -> Result<Self, ParameterError> {
-        let AxisParameters { drive, screw, encoder, mm_s_per_volt, start_position_mm } = parameters;
+        let AxisParameters { drive, encoder, mm_s_per_volt, start_position_mm, .. } = parameters;
         finite("mm_s_per_volt", mm_s_per_volt)?;
         if mm_s_per_volt == 0.0 {
             return Err(ParameterError::OutOfRange { quantity: "mm_s_per_volt", value: mm_s_per_volt });
@@ -74,7 +78,8 @@ impl<const LINE: usize> SimAxis<LINE> {
         Ok(Self {
             model,
             state: DriveState::at_rest(&model, start_position_mm)?,
-            screw: Screw::new(screw, start_position_mm)?,
+            #[cfg(feature = "screw")]
+            screw: Screw::new(parameters.screw, start_position_mm)?,
             encoder: SimEncoder::new(encoder, start_position_mm)?,
             mm_s_per_volt,
         })
@@ -85,6 +90,7 @@ impl<const LINE: usize> SimAxis<LINE> {
     pub fn advance(&mut self, output_v: f64, is_enabled: bool) {
         let command_mm_s = if is_enabled { output_v * self.mm_s_per_volt } else { 0.0 };
         self.model.tick(&mut self.state, command_mm_s);
+        #[cfg(feature = "screw")]
         self.screw.turn(self.state.position_mm());
     }
 
@@ -106,7 +112,10 @@ impl<const LINE: usize> SimAxis<LINE> {
     /// True position of the load \[mm\]: the motor's, without errors of the screw.
     #[must_use]
     pub fn load_mm(&self) -> f64 {
-        self.screw.load_mm()
+        #[cfg(feature = "screw")]
+        return self.screw.load_mm();
+        #[cfg(not(feature = "screw"))]
+        self.state.position_mm()
     }
 
     /// The drive's state: the motor's true position, velocity, torque.

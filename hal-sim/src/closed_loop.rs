@@ -29,6 +29,7 @@ use crate::dac_chip::{Ad5754Chip, ChipError};
 use crate::drive_parameters::{REFERENCE_X, REFERENCE_Y};
 use crate::encoder::{EncoderParameters, REFERENCE_ENCODER};
 use crate::machine::{MachineParameters, SimMachine};
+#[cfg(feature = "screw")]
 use crate::screw::ScrewParameters;
 
 /// The reference drives with a program's scales: the first axis is S4's X, the second its Y, all others are
@@ -41,6 +42,7 @@ pub fn reference_machine<const AXES: usize>(header: &Header<AXES>, substeps: u32
     }
     let axes = core::array::from_fn(|axis| AxisParameters {
         drive: drives[axis],
+        #[cfg(feature = "screw")]
         screw: ScrewParameters::default(),
         encoder: EncoderParameters { resolution_mm: header.axes[axis].mm_per_count, ..REFERENCE_ENCODER },
         mm_s_per_volt: header.axes[axis].mm_s_at_10_v / DacCode::FULL_SCALE_V,

@@ -84,6 +84,7 @@ mod injection;
 mod machine;
 mod noise;
 mod parameter;
+#[cfg(feature = "screw")]
 mod screw;
 
 pub use axis::{AxisParameters, REFERENCE_MM_S_PER_VOLT, SimAxis};
@@ -99,4 +100,5 @@ pub use machine::{
     SimMachine,
 };
 pub use parameter::ParameterError;
+#[cfg(feature = "screw")]
 pub use screw::{PitchErrorParameters, ScrewParameters};

@@ -204,9 +204,8 @@ const _: () = assert!(
 );
 const _: () = assert!(TICK_HZ.is_multiple_of(1000), "the link counts whole milliseconds");
 
-/// Ticks that the flight recorder keeps: a twentieth of a second, 17 KB, what the stack leaves; with the link, which needs
-/// some of it, a twenty-fifth.
-pub const FLIGHT_ROWS: usize = TICK_HZ as usize / if cfg!(feature = "link") { 25 } else { 20 };
+/// Ticks that the flight recorder keeps: 45 ms, 16 KB, what the stack leaves; with the link, which needs some of it, 40 ms.
+pub const FLIGHT_ROWS: usize = TICK_HZ as usize / if cfg!(feature = "link") { 25 } else { 22 };
 /// Ticks of these after the fault's: 25 ms, which show the axes coasting.
 pub const FLIGHT_AFTER: usize = TICK_HZ as usize / 40;
 
