@@ -35,7 +35,7 @@ mod tests;
 mod transmit;
 
 /// The background. `ITEMS` and `PLACES` are those of [`Streamed`]; there is room for `PARAMETERS` bytes of new parameters (three
-/// axes of the reference machine take 578, nine less than 1800, each that is homed less than 110 more, each that is compensated less than 140), none on a board that can't store them.
+/// axes of the reference machine take 578, nine less than 1800, each that is homed less than 110 more, each that is compensated less than 160), none on a board that can't store them.
 pub struct Linked<
     'a,
     R: Real,
