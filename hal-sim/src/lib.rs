@@ -15,7 +15,7 @@
 //!               │ volts, held over the tick
 //!               ▼
 //!            DriveModel      dead time, velocity controller, current limit, inertia, friction, bed
-//!               │ the motor's true position ───► Screw: pitch error, play ───► the load's
+//!               │ the motor's true position ───► Screw (feature `screw`): pitch error, play ───► the load's
 //!               ▼
 //!            SimEncoder      counts, 16- or 32-bit timer, noise
 //!               │ the kernel's own CountExtender

@@ -176,18 +176,18 @@ impl<R> FaultKind<R> {
 
 impl<R> FaultKind<R> {
     /// The axes whose counts can't be trusted any more, the lowest bit is the first one's.
-    pub(crate) fn axes_without_counts(&self) -> u16 {
+    pub(crate) fn axes_without_counts(&self) -> u32 {
         match *self {
             Self::EncoderLost { axis } | Self::EncoderJump { axis, .. } => axis_bit(axis),
-            Self::Encoder => u16::MAX,
+            Self::Encoder => u32::MAX,
             _ => 0,
         }
     }
 }
 
 /// The bit of an axis in a set of axes, 0 if there is none for it.
-pub(crate) fn axis_bit(axis: usize) -> u16 {
-    u32::try_from(axis).ok().and_then(|axis| 1u16.checked_shl(axis)).unwrap_or_default()
+pub(crate) fn axis_bit(axis: usize) -> u32 {
+    u32::try_from(axis).ok().and_then(|axis| 1u32.checked_shl(axis)).unwrap_or_default()
 }
 
 impl<R: Real> Fault<R> {

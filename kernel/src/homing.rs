@@ -109,8 +109,8 @@ pub struct HomingInput<const AXES: usize> {
     pub counts: Counts,
     /// Its home switch, as read in the same tick.
     pub is_home: bool,
-    /// Its encoder's reading in the tick in which the switch last closed, where every tick looks for that; `None` where every
-    /// tick is polled.
+    /// Its encoder's reading in the tick in which the switch closed, the first time since a poll that found it open, where every
+    /// tick looks for that; `None` where every tick is polled.
     pub home_counts: Option<Counts>,
     /// The count in its index latch ([`IndexLatch`](crate::hal::IndexLatch)).
     pub index: Option<Counts>,

@@ -94,7 +94,7 @@ pub struct Kernel<R: Real, const AXES: usize> {
     preview: Preview<AXES>,
     guards: Guards<AXES>,
     /// Axes whose encoder failed since their last reference, the lowest bit is the first one's. No tick follows from it.
-    without_counts: u16,
+    without_counts: u32,
 }
 
 impl<R: Real, const AXES: usize> Kernel<R, AXES> {
@@ -310,12 +310,14 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         }
     }
 
-    /// Latches the first axis that is lost.
+    /// Latches the first axis that is lost; all that are lost in the same tick are judged.
     #[cold]
     fn lose(&mut self) {
-        let lost = self.trace.axes.iter().enumerate().find(|(_, output)| output.lost);
-        if let Some((axis, &AxisOutput { following_error_mm: error_mm, .. })) = lost {
-            self.judge(axis, error_mm);
+        for axis in 0..AXES {
+            let output = self.trace.axes.get(axis);
+            if let Some(&AxisOutput { lost: true, following_error_mm: error_mm, .. }) = output {
+                self.judge(axis, error_mm);
+            }
         }
     }
 
@@ -350,8 +352,9 @@ impl<R: Real, const AXES: usize> Kernel<R, AXES> {
         self.trace.fault
     }
 
-    /// Whether the encoder of an axis has failed since the axis was last [referenced](Kernel::reference): its position can't be
-    /// trusted, also where another fault was there before and after all faults are cleared.
+    /// Whether the encoder of an axis was seen to fail since the axis was last [referenced](Kernel::reference): its position
+    /// can't be trusted, also where another fault was there before and after all faults are cleared. With the drives off
+    /// only a failed reading is seen.
     #[must_use]
     pub fn has_lost_counts(&self, axis: usize) -> bool {
         self.without_counts & axis_bit(axis) != 0

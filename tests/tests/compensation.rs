@@ -256,7 +256,7 @@ fn the_loads_position_is_told() {
         let [errors_um, compensated_um] = [Screws::WithErrors, Screws::Compensated]
             .map(|screws| run(CIRCLE, &machine(screws, is_inverted), Number::F32).untold_um());
         println!("told and true differ by {errors_um:.2} µm, with compensation by {compensated_um:.2} µm");
-        assert!(errors_um > 1e3 * PLAY_MM && compensated_um < 2.0, "{errors_um} {compensated_um}");
+        assert!(errors_um > 1e3 * PLAY_MM && compensated_um < 0.5, "{errors_um} {compensated_um}");
     }
 }
 

@@ -40,7 +40,7 @@ pub struct Control<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTE
 struct HomeSwitch {
     axis: usize,
     is_closed: bool,
-    /// The encoder's reading in the tick that saw it close last.
+    /// The encoder's reading in the first tick that saw it close, since the background saw it open.
     closed_at: Option<Counts>,
 }
 
@@ -126,7 +126,7 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
                 (trace.inputs.axes.get(home.axis), trace.axes.get(home.axis))
         {
             let was_closed = core::mem::replace(&mut home.is_closed, inputs.is_home());
-            if home.is_closed && !was_closed {
+            if home.is_closed && !was_closed && home.closed_at.is_none() {
                 home.closed_at = Some(output.counts);
             }
         }
@@ -156,17 +156,16 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
         self.index
     }
 
-    /// What an axis' encoder read when its home switch closed last, since this was first asked of that axis.
+    /// What an axis' encoder read when its home switch closed first, since this found it open: contacts bounce.
     pub(crate) fn home_counts(&mut self, axis: usize) -> Option<Counts> {
-        match self.home {
-            Some(home) if home.axis == axis => home.closed_at,
-            _ => {
-                let inputs = self.kernel.trace().inputs.axes.get(axis);
-                let is_closed = inputs.is_some_and(|axis| axis.is_home());
-                self.home = Some(HomeSwitch { axis, is_closed, closed_at: None });
-                None
-            }
-        }
+        let inputs = self.kernel.trace().inputs.axes.get(axis);
+        let is_closed = inputs.is_some_and(|axis| axis.is_home());
+        let closed_at = match self.home {
+            Some(home) if home.axis == axis && is_closed => home.closed_at,
+            _ => None,
+        };
+        self.home = Some(HomeSwitch { axis, is_closed, closed_at });
+        closed_at
     }
 
     /// Nobody asks for a home switch or an index any more.

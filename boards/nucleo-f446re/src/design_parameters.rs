@@ -188,8 +188,10 @@ pub const LINK_ERROR_BASIS_POINTS: i32 =
 /// Places for bytes that the DMA has brought: twice what may come between two looks of the background at them, a step of a
 /// plan.
 pub const LINK_RING: usize = 4096;
-/// Most bytes of parameters that the board keeps: three axes of the reference machine take some 600.
-pub const PARAMETERS_MAX: usize = 1024;
+/// Most bytes of parameters that the board keeps: three axes of the reference machine take 578, each that is homed less than
+/// 110 more, each that is compensated less than 160.
+pub const PARAMETERS_MAX: usize = 1408;
+const _: () = assert!(PARAMETERS_MAX >= 578 + 3 * (110 + 160), "all axes may be homed and compensated");
 /// Where it keeps them: sectors 1 and 2, 16 KiB each, between the vectors and the code (RM0390, table 5) \[bytes from the begin of
 /// flash\]. The emulated board's are memory.
 pub const PARAMETER_SECTORS: core::ops::Range<u32> =

@@ -9,7 +9,7 @@ use hal_sim::{
 use motion_kernel::axis::{
     AxesConfig, AxisCompensation, BED_TICK_SHARE_MAX, Backlash, BedInverse, COMPENSATION_POINTS_MAX,
     Compensation, DriveInverse, Feedforward, Gains, GuardFigures, Guards, LEAD_ROUNDING_TICKS,
-    PITCH_ERROR_SLOPE_MAX, PREVIEW_TICKS_MAX, PitchError, TABLE_POINTS, Table, Tables,
+    PITCH_ERROR_SLOPE_MAX, PREVIEW_TICKS_MAX, PitchError, TABLE_POINTS, TAKE_UP_TICKS_MAX, Table, Tables,
 };
 use motion_kernel::fault::Reaction;
 use motion_kernel::homing::HomingConfig;
@@ -29,7 +29,7 @@ use super::range::{
     Limit, Load, MassRatio, NAME_CHARACTERS_MAX, NOISE_COUNTS, NOISE_COUNTS_MAX, NOISE_SEED, OutputLimit,
     OutputOffset, PATH_MODE, PitchErrorPoint, Place, Play, PlayOrNone, Positive, REPEATS, Ramp, Resolution,
     Reversal, SPINDLE_TURNS, SUBROUTINE, Spacing, SpindleSpeed, SpindleTime, StopTime, TIMER_BITS,
-    TablePoint, Tick, Velocity, Watch, Within,
+    TablePoint, TakeUp, Tick, Velocity, Watch, Within,
 };
 use super::settings::{
     AxisSettings, BLEND_TOLERANCE_MM, CORNER_ANGLE_DEG, CoolantSettings, DefaultPathMode, FaultSettings,
@@ -152,6 +152,18 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine<AXES_MAX>, M
                 );
                 return Err(refuse(at.clone(), expected));
             }
+            let least_s = axis.unsuspected_take_up_s(backlash.play_mm, axes.len(), tick_s);
+            if backlash.take_up_s < least_s {
+                let expected = format!(
+                    "at least {least_s:.6}: load_accel_mm_s2 of the axis' guard takes faster ones for a runaway"
+                );
+                return Err(refuse(at.clone(), expected));
+            }
+            let ticks = (backlash.take_up_s / tick_s).round();
+            if !(1.0..=TAKE_UP_TICKS_MAX).contains(&ticks) {
+                let expected = format!("from 1 to {TAKE_UP_TICKS_MAX} ticks of tick_s = {tick_s}");
+                return Err(refuse(at.clone(), expected));
+            }
         }
         if let (Some(at), Some(error)) = (&places.points_um, pitch_error)
             && error.slope() > PITCH_ERROR_SLOPE_MAX
@@ -161,6 +173,17 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine<AXES_MAX>, M
                 error.slope()
             );
             return Err(refuse(at.clone(), expected));
+        }
+        if let (Some(at), Some(error)) = (&places.points_um, pitch_error) {
+            let most_mm_s2 = 0.5 * axis.drive_accel_mm_s2();
+            let accel_mm_s2 = error.curvature() * axis.feed_mm_s * axis.feed_mm_s;
+            if accel_mm_s2 > most_mm_s2 {
+                let expected = format!(
+                    "a curve along which the motor needs at most {most_mm_s2:.0} mm/s² at feed_mm_s, half of what the drive \
+                     has (here {accel_mm_s2:.0})"
+                );
+                return Err(refuse(at.clone(), expected));
+            }
         }
     }
     for touch in file.probe.iter().flat_map(|probe| &probe.boxes) {
@@ -517,7 +540,7 @@ struct CompensationTable {
 #[serde(deny_unknown_fields)]
 struct BacklashTable {
     play_mm: Within<Play>,
-    take_up_s: Spanned<Within<Watch>>,
+    take_up_s: Spanned<Within<TakeUp>>,
 }
 
 #[derive(Deserialize)]

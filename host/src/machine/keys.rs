@@ -13,7 +13,7 @@ use super::range::{
     Gain, Inertia, IntegralTime, InverseGain, Jump, JunctionAngle, Lag, LeadTime, Length, LengthOrNone,
     Limit, Load, MassRatio, NOISE_COUNTS, NOISE_SEED, OutputLimit, OutputOffset, PATH_MODE, PitchErrorPoint,
     Place, Play, PlayOrNone, Positive, REPEATS, Ramp, Range, Resolution, Reversal, SPINDLE_TURNS, SUBROUTINE,
-    Spacing, SpindleSpeed, SpindleTime, StopTime, TIMER_BITS, TablePoint, Tick, Velocity, Watch,
+    Spacing, SpindleSpeed, SpindleTime, StopTime, TIMER_BITS, TablePoint, TakeUp, Tick, Velocity, Watch,
 };
 
 /// A table of the file with its keys, without its tables.
@@ -476,9 +476,9 @@ pub const KEY_TABLES: &[KeyTable] = &[
             Key::new(
                 "take_up_s",
                 "s",
-                Watch::EXPECTED,
+                TakeUp::EXPECTED,
                 "How long that takes; so long that the motor needs at most feed_mm_s and half of the acceleration that the \
-                 drive has.",
+                 drive has, and that the guard does not take it for a runaway.",
             ),
         ],
     ),

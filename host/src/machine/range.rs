@@ -5,6 +5,7 @@
 use std::fmt;
 use std::marker::PhantomData;
 
+use motion_kernel::axis::{BACKLASH_MM_MAX, PITCH_ERROR_SPACING_MM, PITCH_ERROR_UM_MAX};
 use motion_kernel::plan::CURVE_FEED_SHARE_MAX;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error, Unexpected, Visitor};
@@ -97,11 +98,12 @@ ranges! {
     LengthOrNone: "a number from 0 to 100000", |value| (0.0..=1e5).contains(&value);
     Place: "a number from -100000 to 100000", |value| value.abs() <= 1e5;
     MassRatio: "a number from 1e-6 to 100", |value| (1e-6..=100.0).contains(&value);
-    Play: "a number above 0, at most 1", |value| value > 0.0 && value <= 1.0;
-    PlayOrNone: "a number from 0 to 1", |value| (0.0..=1.0).contains(&value);
-    Spacing: "a number from 0.01 to 1000", |value| (0.01..=1000.0).contains(&value);
-    PitchErrorPoint: "a number from -300 to 300", |value| value.abs() <= 300.0;
-    Amplitude: "a number from 0 to 300", |value| (0.0..=300.0).contains(&value);
+    Play: "a number above 0, at most 1", |value| value > 0.0 && value <= BACKLASH_MM_MAX;
+    TakeUp: "a number from 0.00002 to 1", |value| (2e-5..=1.0).contains(&value);
+    PlayOrNone: "a number from 0 to 1", |value| (0.0..=BACKLASH_MM_MAX).contains(&value);
+    Spacing: "a number from 0.01 to 1000", |value| value >= PITCH_ERROR_SPACING_MM[0] && value <= PITCH_ERROR_SPACING_MM[1];
+    PitchErrorPoint: "a number from -300 to 300", |value| value.abs() <= PITCH_ERROR_UM_MAX;
+    Amplitude: "a number from 0 to 300", |value| (0.0..=PITCH_ERROR_UM_MAX).contains(&value);
     Angle: "a number from -360 to 360", |value| value.abs() <= 360.0;
     Inertia: "a number above -1, at most 1000", |value| value > -1.0 && value <= 1000.0;
 }

@@ -6,7 +6,7 @@ use hal_sim::{
 };
 use motion_kernel::axis::{
     AxesConfig, AxesError, AxisCompensation, AxisFigures, Compensation, Feedforward, Gains, GuardFigures,
-    Guards, TAKE_UP_PEAKS,
+    Guards, SAMPLE_TICKS, TAKE_UP_PEAKS,
 };
 use motion_kernel::fault::{Reaction, Reactions};
 use motion_kernel::homing::HomingConfig;
@@ -549,9 +549,25 @@ impl AxisSettings {
     /// for what moves with it, do not bind it.
     #[must_use]
     pub fn take_up_s(&self, play_mm: f64) -> f64 {
-        let accel_mm_s2 = 0.5 * self.drive.accel_limit_mm_s2 / (1.0 + self.drive.load_inertia_ratio);
+        let accel_mm_s2 = 0.5 * self.drive_accel_mm_s2();
         let [of_velocity, of_accel, _] = TAKE_UP_PEAKS;
         (of_velocity * play_mm / self.feed_mm_s).max((of_accel * play_mm / accel_mm_s2).sqrt())
+    }
+
+    /// The acceleration that its drive has \[mm/s²\].
+    #[must_use]
+    pub fn drive_accel_mm_s2(&self) -> f64 {
+        self.drive.accel_limit_mm_s2 / (1.0 + self.drive.load_inertia_ratio)
+    }
+
+    /// The shortest time in which its motor may go through a play without the guard of a machine of `axes` axes taking that for
+    /// a runaway \[s\]: from one sample to the next its velocity changes by less than the load that is allowed for, beside the axis'
+    /// own acceleration. Any time where the guard allows for no more than that.
+    #[must_use]
+    pub fn unsuspected_take_up_s(&self, play_mm: f64, axes: usize, tick_s: f64) -> f64 {
+        let round_s = f64::from(SAMPLE_TICKS) * axes as f64 * tick_s;
+        let room_mm_s = (self.guard_figures(tick_s).load_accel_mm_s2 - self.accel_mm_s2) * round_s;
+        if room_mm_s > 0.0 { TAKE_UP_PEAKS[0] * play_mm / room_mm_s } else { 0.0 }
     }
 
     /// The axis in the kernel's terms.
@@ -587,7 +603,7 @@ impl AxisSettings {
         let constant_s = (1.0 + drive.load_inertia_ratio) / drive.velocity_gain_per_s;
         let response_s = drive.dead_time_s + drive.command_filter_s + drive.current_lag_s + 3.0 * constant_s;
         let counts_mm = self.mm_per_count * (2.0 + 4.0 * f64::from(noise_counts));
-        let accel_mm_s2 = drive.accel_limit_mm_s2 / (1.0 + drive.load_inertia_ratio);
+        let accel_mm_s2 = self.drive_accel_mm_s2();
         let is_closed = kp_per_s > 0.0;
         let per_kp = |value: f64| if is_closed { value / kp_per_s } else { 0.0 };
         let derived = GuardFigures {

@@ -14,7 +14,8 @@
 //!
 //! **Positions are the load's.** c goes into the offset between encoder and position, so that set and actual position, following
 //! error, travel and references are the load's; the regulator sees the same error. c belongs to the position that is regulated
-//! to: behind the preview. Its derivatives go to feedforward, which comes before that, so they are those of the present set-point.
+//! to: behind the preview. Its derivatives go to feedforward, which comes before that, so they are those of the present set-point;
+//! of the table's jerk, the part with the axis' own jerk alone.
 //!
 //! In the tick, without a loop, a division or a failure. An axis without compensation pays for the question alone.
 //!
@@ -34,33 +35,22 @@ use serde::{Deserialize, Serialize};
 
 use super::check::{Check, fits};
 use super::{AxesConfig, AxesError, AxisConfig, AxisState};
-use crate::num::{Real, is_within};
+use crate::num::Real;
 use crate::path::Setpoint;
 use crate::units::{Counts, Position};
 
-/// Most points of a table.
-pub const COMPENSATION_POINTS_MAX: usize = 32;
-/// Greatest error at a point, in either direction \[µm\].
-pub const PITCH_ERROR_UM_MAX: f64 = 300.0;
-/// Greatest slope from point to point, in either direction \[mm/mm\].
-pub const PITCH_ERROR_SLOPE_MAX: f64 = 0.02;
-/// Least and greatest distance of two points \[mm\].
-pub const PITCH_ERROR_SPACING_MM: [f64; 2] = [0.01, 1000.0];
-/// Greatest backlash \[mm\].
-pub const BACKLASH_MM_MAX: f64 = 1.0;
-/// Greatest velocity, acceleration and jerk of a take-up over its backlash in its time: b/T, b/T², b/T³ times these.
-pub const TAKE_UP_PEAKS: [f64; 3] = [2.1875, 7.513_188_404_399_293, 52.5];
+mod pitch_error;
+mod take_up;
 
-/// Points are whole steps of this \[mm\].
-const STEP_MM: f64 = 1.0e-5;
-const STEPS_PER_UM: f64 = 100.0;
-/// A take-up has at most so many ticks.
-const TAKE_UP_TICKS_MAX: f64 = 60_000.0;
+pub use pitch_error::{
+    COMPENSATION_POINTS_MAX, PITCH_ERROR_SLOPE_MAX, PITCH_ERROR_SPACING_MM, PITCH_ERROR_UM_MAX, PitchError,
+};
+use pitch_error::{Curve, Table};
+use take_up::TakeUp;
+pub use take_up::{BACKLASH_MM_MAX, Backlash, TAKE_UP_PEAKS, TAKE_UP_TICKS_MAX};
+
 /// Set velocity from which on a direction is one \[mm/s\]: less may be rounding of an axis that stands while others move.
 const MOVING_MM_S: f64 = 1.0e-3;
-/// How far off a place in a table may be, over its distance from the start and the table's length: 2⁻³² \[1/mm\].
-#[cfg(test)]
-const PLACE_PER_MM2: f64 = 1.0 / 4_294_967_296.0;
 /// Rounds in which the error where the load is, is found from where the encoder is: each leaves a twentieth or less.
 const SETTLING_ROUNDS: u8 = 4;
 
@@ -84,271 +74,6 @@ pub struct AxisCompensation {
     pub backlash: Option<Backlash>,
     /// The screw's error.
     pub pitch_error: Option<PitchError>,
-}
-
-/// Play between motor and load.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Backlash {
-    /// The play \[mm\], above 0, at most [`BACKLASH_MM_MAX`].
-    pub play_mm: f64,
-    /// How long the motor takes to go through it \[s\], from a tick to 60000; not faster than the axis' output
-    /// ([`TAKE_UP_PEAKS`]).
-    pub take_up_s: f64,
-}
-
-/// The error of a screw over its travel: where the load is, less where the motor is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct PitchError {
-    /// Where the first point lies \[mm\], within ±10⁶.
-    pub start_mm: f64,
-    /// Distance of two points \[mm\], within [`PITCH_ERROR_SPACING_MM`].
-    pub spacing_mm: f64,
-    /// How many points there are, from 2 to [`COMPENSATION_POINTS_MAX`].
-    points: u16,
-    /// The first point follows the last one again, everywhere; else the end points hold beyond the ends.
-    pub repeats: bool,
-    /// Points in steps of 10 nm; those that there are not are 0.
-    #[serde(with = "crate::array")]
-    steps: [i16; COMPENSATION_POINTS_MAX],
-}
-
-impl PitchError {
-    /// The table through `points_um` \[µm\], each rounded to 10 nm. `None` for fewer points than 2 or more than
-    /// [`COMPENSATION_POINTS_MAX`], and for one beyond [`PITCH_ERROR_UM_MAX`]. The other figures are checked where the
-    /// axes are [compensated](AxesConfig::compensated).
-    #[must_use]
-    pub fn new(start_mm: f64, spacing_mm: f64, points_um: &[f64], repeats: bool) -> Option<Self> {
-        let count = points_um.len();
-        let are_errors = points_um.iter().all(|&um| is_within(um, -PITCH_ERROR_UM_MAX, PITCH_ERROR_UM_MAX));
-        if !(2..=COMPENSATION_POINTS_MAX).contains(&count) || !are_errors {
-            return None;
-        }
-        let mut steps = [0; COMPENSATION_POINTS_MAX];
-        for (step, um) in steps.iter_mut().zip(points_um) {
-            *step = libm::round(um * STEPS_PER_UM) as i16;
-        }
-        Some(Self { start_mm, spacing_mm, points: count as u16, repeats, steps })
-    }
-
-    /// The points in steps.
-    fn points(&self) -> &[i16] {
-        self.steps.get(..self.points.into()).unwrap_or_default()
-    }
-
-    /// How many points there are.
-    #[must_use]
-    pub fn point_count(&self) -> usize {
-        self.points().len()
-    }
-
-    /// The error at a point, from 0 \[µm\].
-    #[must_use]
-    pub fn point_um(&self, index: usize) -> Option<f64> {
-        self.points().get(index).map(|&step| f64::from(step) / STEPS_PER_UM)
-    }
-
-    /// The greatest slope from point to point, in either direction \[mm/mm\].
-    #[must_use]
-    pub fn slope(&self) -> f64 {
-        let points = self.points();
-        let after = points.iter().skip(1).chain(points.first().filter(|_| self.repeats));
-        let change = points.iter().zip(after).fold(0, |most, (&from, &to)| {
-            core::cmp::max(most, (i32::from(to) - i32::from(from)).unsigned_abs())
-        });
-        f64::from(change) * STEP_MM / self.spacing_mm
-    }
-}
-
-/// A [`PitchError`] made for the tick.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Table<R> {
-    start: Position,
-    /// From the first point to the last one, or to the first one again.
-    length: Position,
-    /// 2⁶⁴ over the length in steps of positions: a place in the table is a fraction of its length, for one product. It is
-    /// rounded: a place is off by 2⁻³²/mm of its distance from the start, times the length.
-    per_length: u64,
-    intervals: u16,
-    repeats: bool,
-    per_spacing: R,
-    step_mm: R,
-    half_step_mm: R,
-    steps: [i16; COMPENSATION_POINTS_MAX],
-}
-
-/// The curve at a place: its value, and its first and second derivative by intervals \[mm\].
-struct Curve<R> {
-    error_mm: R,
-    first_mm: R,
-    second_mm: R,
-}
-
-impl<R: Real> Table<R> {
-    fn new(check: &mut Check, error: &PitchError) -> Self {
-        let &PitchError { start_mm, spacing_mm, points, repeats, steps } = error;
-        check.within([-1.0e6, 1.0e6], "start of the pitch error [mm]", start_mm, "a number from -1e6 to 1e6");
-        let expected = "a number from 0.01 to 1000";
-        check.within(PITCH_ERROR_SPACING_MM, "spacing of the pitch error [mm]", spacing_mm, expected);
-        let count = f64::from(points);
-        let expected = "from 2 to 32";
-        check.within([2.0, COMPENSATION_POINTS_MAX as f64], "points of the pitch error", count, expected);
-        let most = error.points().iter().fold(0, |most, step| core::cmp::max(most, step.unsigned_abs()));
-        let most_um = f64::from(most) / STEPS_PER_UM;
-        let expected = "at most 300 in either direction";
-        check.within([0.0, PITCH_ERROR_UM_MAX], "pitch error [µm]", most_um, expected);
-        let expected = "at most 0.02 from point to point";
-        check.within(
-            [0.0, PITCH_ERROR_SLOPE_MAX],
-            "slope of the pitch error [mm/mm]",
-            error.slope(),
-            expected,
-        );
-        let intervals = points.saturating_sub(u16::from(!repeats));
-        let length_mm = spacing_mm * f64::from(intervals);
-        let length = Position::from_mm(length_mm).unwrap_or_default();
-        Self {
-            start: Position::from_mm(start_mm).unwrap_or_default(),
-            length,
-            per_length: u64::MAX.checked_div(length.to_bits().unsigned_abs()).unwrap_or_default(),
-            intervals,
-            repeats,
-            per_spacing: R::from_f64(1.0 / spacing_mm),
-            step_mm: R::from_f64(STEP_MM),
-            half_step_mm: R::from_f64(0.5 * STEP_MM),
-            steps,
-        }
-    }
-
-    /// A point; behind the last one of a table that repeats, the first one again.
-    fn step(&self, index: usize) -> i32 {
-        let last = usize::from(self.intervals);
-        let index = if self.repeats && index >= last { index - last } else { index };
-        self.steps.get(index).copied().unwrap_or_default().into()
-    }
-
-    /// The curve where the load is.
-    fn at(&self, load: Position) -> Curve<R> {
-        let ahead = (load - self.start).to_bits();
-        let intervals = usize::from(self.intervals);
-        let holds = |index: usize| Curve {
-            error_mm: steps::<R>(self.step(index)) * self.step_mm,
-            first_mm: R::ZERO,
-            second_mm: R::ZERO,
-        };
-        if !self.repeats {
-            if ahead <= 0 {
-                return holds(0);
-            }
-            if ahead >= self.length.to_bits() {
-                return holds(intervals);
-            }
-        }
-        // Modulo 2⁶⁴, as a fraction of the length: a table that repeats needs no remainder.
-        let fraction = ahead.cast_unsigned().wrapping_mul(self.per_length) >> 32;
-        let place = fraction * u64::from(self.intervals);
-        let index = (place >> 32) as usize;
-        let t = R::from_q32((place & 0xFFFF_FFFF).cast_signed());
-        let (from, to) = (self.step(index), self.step(index + 1));
-        // At an end that holds, its neighbour is its own mirror image.
-        let before = match index.checked_sub(1) {
-            Some(before) => self.step(before),
-            None if self.repeats => self.step(intervals.saturating_sub(1)),
-            None => to,
-        };
-        let after = if !self.repeats && index + 1 >= intervals { from } else { self.step(index + 2) };
-        // Twice the slopes at both ends; with h = to − from: error = from + t·(m₀ + t·(b + t·a)).
-        let (m0, m1, h) = (to - before, after - from, to - from);
-        let (a, b) = (m0 + m1 - 4 * h, 6 * h - 2 * m0 - m1);
-        let [m0, a, b] = [m0, a, b].map(|twice| steps::<R>(twice) * self.half_step_mm);
-        let ta = t * a;
-        let (ta2, ta3) = (ta + ta, ta + ta + ta);
-        Curve {
-            error_mm: steps::<R>(from) * self.step_mm + t * (m0 + t * (b + ta)),
-            first_mm: m0 + t * (b + b + ta3),
-            second_mm: b + b + ta2 + ta2 + ta2,
-        }
-    }
-}
-
-fn steps<R: Real>(steps: i32) -> R {
-    R::from_q32(i64::from(steps) << 32)
-}
-
-/// A [`Backlash`] made for the tick.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct TakeUp<R> {
-    play_mm: R,
-    ticks: u16,
-    per_tick: R,
-    /// Over the play and the time T: b/T, b/T², b/T³.
-    velocity_mm_s: R,
-    accel_mm_s2: R,
-    jerk_mm_s3: R,
-}
-
-impl<R: Real> TakeUp<R> {
-    fn new(check: &mut Check, backlash: &Backlash, most_mm_s: f64, tick_s: f64) -> Self {
-        let &Backlash { play_mm, take_up_s } = backlash;
-        let is_play = play_mm > 0.0 && play_mm <= BACKLASH_MM_MAX;
-        check.that(is_play, "backlash [mm]", play_mm, "a number above 0, at most 1");
-        // Whole ticks, one at least: what is rounded is less than a tick.
-        let ticks = libm::round(take_up_s / tick_s);
-        let expected = "from one tick to 60000";
-        check.within([1.0, TAKE_UP_TICKS_MAX], "ticks of a take-up", ticks, expected);
-        let take_up_s = ticks * tick_s;
-        let [velocity_mm_s, accel_mm_s2, jerk_mm_s3] = [
-            play_mm / take_up_s,
-            play_mm / take_up_s / take_up_s,
-            play_mm / take_up_s / take_up_s / take_up_s,
-        ];
-        let [peak, _, peak_of_jerk] = TAKE_UP_PEAKS;
-        let expected = "a take-up that the output reaches, within the kernel's range";
-        let is_reached = peak * velocity_mm_s <= most_mm_s && fits::<R>(8.0 * peak_of_jerk * jerk_mm_s3);
-        check.that(is_reached, "velocity of a take-up [mm/s]", peak * velocity_mm_s, expected);
-        Self {
-            play_mm: R::from_f64(play_mm),
-            ticks: ticks as u16,
-            per_tick: R::from_f64(1.0 / ticks),
-            velocity_mm_s: R::from_f64(velocity_mm_s),
-            accel_mm_s2: R::from_f64(accel_mm_s2),
-            jerk_mm_s3: R::from_f64(jerk_mm_s3),
-        }
-    }
-
-    /// c of the play, after so many ticks of a take-up to the side \[mm\].
-    fn at(&self, ticks: u16, is_negative: bool) -> R {
-        let share = if ticks >= self.ticks {
-            R::ONE
-        } else {
-            let u = number::<R>(ticks) * self.per_tick;
-            let u2 = u * u;
-            let [c4, c5, c6, c7] = [35, 84, 70, 20].map(number::<R>);
-            u2 * u2 * (c4 - u * (c5 - u * (c6 - u * c7)))
-        };
-        let share = if is_negative { share } else { R::ONE - share };
-        -(self.play_mm * share)
-    }
-
-    /// Adds velocity, acceleration and jerk of c after so many ticks of a take-up to the side.
-    fn add(&self, setpoint: &mut Setpoint<R>, ticks: u16, is_negative: bool) {
-        if ticks >= self.ticks {
-            return;
-        }
-        let u = number::<R>(ticks) * self.per_tick;
-        let w = u * (R::ONE - u);
-        let [s1, s2, s3, five] = [140, 420, 840, 5].map(number::<R>);
-        let velocity = self.velocity_mm_s * (s1 * w * w * w);
-        let accel = self.accel_mm_s2 * (s2 * w * w * (R::ONE - u - u));
-        let jerk = self.jerk_mm_s3 * (s3 * w * (R::ONE - five * w));
-        let signed = |value: R| if is_negative { -value } else { value };
-        setpoint.velocity_mm_s = setpoint.velocity_mm_s + signed(velocity);
-        setpoint.accel_mm_s2 = setpoint.accel_mm_s2 + signed(accel);
-        setpoint.jerk_mm_s3 = setpoint.jerk_mm_s3 + signed(jerk);
-    }
-}
-
-fn number<R: Real>(count: u16) -> R {
-    R::from_q32(i64::from(count) << 32)
 }
 
 /// [`AxisCompensation`] made for the tick. Immutable.
@@ -522,6 +247,7 @@ impl<R: Real> AxisState<R> {
 
 #[cfg(test)]
 mod tests {
+    use super::pitch_error::tests::{expected, random_table};
     use super::*;
     use crate::axis::{AxisOutput, ScaleError};
     use crate::fixture::figures;
@@ -539,146 +265,6 @@ mod tests {
             .compensated(&Compensation { axes: [Some(compensation)] }, TICK_S)
             .map(|axes| axes.axes[0])
             .map_err(|error| error.cause)
-    }
-
-    fn of_table<R: Real>(error: PitchError) -> Table<R> {
-        Check::all(|check| Table::new(check, &error)).expect("a table")
-    }
-
-    /// A table with random figures, its slope at most the greatest.
-    fn random_table(random: &Random) -> PitchError {
-        let count = 2 + random.below(31) as usize;
-        let spacing_mm = 0.05 * 400.0_f64.powf(random.unit());
-        let most_um = (0.99 * PITCH_ERROR_SLOPE_MAX * spacing_mm * 1e3).min(150.0);
-        let points: Vec<f64> = (0..count).map(|_| most_um * (random.unit() - 0.5)).collect();
-        let start_mm = 2000.0 * (random.unit() - 0.5);
-        PitchError::new(start_mm, spacing_mm, &points, random.below(2) == 0).expect("a table")
-    }
-
-    /// Value, slope and curvature by intervals, in Hermite's basis, from points and slopes found by their numbers \[mm\].
-    fn expected(error: &PitchError, mm: f64) -> [f64; 3] {
-        let count = error.point_count() as i64;
-        let point = |index: i64| {
-            let index =
-                if error.repeats { index.rem_euclid(count) } else { index.clamp(0, count - 1) } as usize;
-            error.point_um(index).expect("a point") * 1e-3
-        };
-        let place = (mm - error.start_mm) / error.spacing_mm;
-        let last = (count - 1) as f64;
-        if !(error.repeats || place > 0.0 && place < last) {
-            return [point(if place > 0.0 { count } else { 0 }), 0.0, 0.0];
-        }
-        let (index, t) = (place.floor() as i64, place - place.floor());
-        let slope = |index: i64| {
-            let is_end = !error.repeats && (index == 0 || index == count - 1);
-            if is_end { 0.0 } else { (point(index + 1) - point(index - 1)) / 2.0 }
-        };
-        let ends = [point(index), slope(index), point(index + 1), slope(index + 1)];
-        let bases = [
-            [2.0 * t * t * t - 3.0 * t * t + 1.0, 6.0 * t * t - 6.0 * t, 12.0 * t - 6.0],
-            [t * t * t - 2.0 * t * t + t, 3.0 * t * t - 4.0 * t + 1.0, 6.0 * t - 4.0],
-            [-2.0 * t * t * t + 3.0 * t * t, -6.0 * t * t + 6.0 * t, -12.0 * t + 6.0],
-            [t * t * t - t * t, 3.0 * t * t - 2.0 * t, 6.0 * t - 2.0],
-        ];
-        core::array::from_fn(|order| ends.iter().zip(&bases).map(|(end, basis)| end * basis[order]).sum())
-    }
-
-    /// Random tables at random places, in all number types.
-    #[test]
-    fn a_table_is_a_smooth_curve_through_its_points() {
-        fn holds<R: Real>(error: &PitchError, mm: f64, tolerance_mm: f64, seed: u64) {
-            let curve = of_table::<R>(*error).at(Position::from_mm(mm).expect("near"));
-            let found = [curve.error_mm, curve.first_mm, curve.second_mm].map(R::to_f64);
-            // How far off the place may be, in intervals: every derivative changes by less than 20 times the change a point.
-            let length_mm = error.spacing_mm * error.point_count() as f64;
-            let off = (mm - error.start_mm).abs() * length_mm * PLACE_PER_MM2 / error.spacing_mm;
-            let tolerance_mm = tolerance_mm + 20.0 * off * error.slope() * error.spacing_mm;
-            for (found, expected) in found.into_iter().zip(expected(error, mm)) {
-                // A step of 10 nm has five digits in fixed point.
-                let is_near = (found - expected).abs() < tolerance_mm + 1.2e-5 * expected.abs();
-                assert!(is_near, "seed {seed}, {mm}: {found:e} {expected:e} of {error:?}");
-            }
-        }
-        for seed in 0..300 {
-            let random = Random::new(seed);
-            let error = random_table(&random);
-            let reach_mm = error.spacing_mm * error.point_count() as f64;
-            for _ in 0..100 {
-                let mut mm = error.start_mm + reach_mm * (3.0 * random.unit() - 1.0);
-                // Curvature steps at points: not there.
-                let part = ((mm - error.start_mm) / error.spacing_mm).rem_euclid(1.0);
-                if !(1e-3..0.999).contains(&part) {
-                    mm += 0.01 * error.spacing_mm;
-                }
-                // Places are multiples of 2⁻³² of the length; curvatures are up to 3 mm.
-                holds::<f64>(&error, mm, 1e-7, seed);
-                holds::<f32>(&error, mm, 5e-7, seed);
-                holds::<Fixed>(&error, mm, 5e-7, seed);
-            }
-            // The points themselves, or 64 turns further on.
-            for index in 0..error.point_count() {
-                let turn_mm = if error.repeats { 64.0 * reach_mm } else { 0.0 };
-                let mm = error.start_mm + error.spacing_mm * index as f64 + turn_mm;
-                let at = Position::from_mm(mm).expect("near");
-                let found = of_table::<f64>(error).at(at).error_mm;
-                let point_mm = error.point_um(index).expect("a point") * 1e-3;
-                let off_mm = (mm - error.start_mm).abs() * reach_mm * PLACE_PER_MM2;
-                let tolerance_mm = 1e-8 + 2.0 * error.slope() * off_mm;
-                assert!(
-                    (found - point_mm).abs() < tolerance_mm,
-                    "seed {seed}, point {index}: {found} {point_mm}"
-                );
-            }
-        }
-    }
-
-    /// Against Bernstein's form of the septic, and differences of it; to either side.
-    #[test]
-    fn a_take_up_goes_from_rest_to_rest() {
-        let share = |u: f64| -> f64 {
-            [35.0, 21.0, 7.0, 1.0]
-                .iter()
-                .zip(4..)
-                .map(|(c, k): (&f64, i32)| c * u.powi(k) * (1.0 - u).powi(7 - k))
-                .sum()
-        };
-        let backlash = Backlash { play_mm: 0.02, take_up_s: 0.01 };
-        let take_up: TakeUp<f64> =
-            Check::all(|check| TakeUp::new(check, &backlash, 1000.0, TICK_S)).expect("a take-up");
-        let (h, mut peaks) = (1e-3, [0.0_f64; 3]);
-        for ticks in 0..=25_u16 {
-            let u = (f64::from(ticks) / 20.0).min(1.0);
-            assert!((take_up.at(ticks, true) + 0.02 * share(u)).abs() < 1e-15);
-            assert!((take_up.at(ticks, false) + 0.02 * (1.0 - share(u))).abs() < 1e-15);
-            if !(1..20).contains(&ticks) {
-                continue;
-            }
-            let [below, above, below2, above2] = [-h, h, -2.0 * h, 2.0 * h].map(|step| share(u + step));
-            let first = (above - below) / (2.0 * h);
-            let second = (above - 2.0 * share(u) + below) / (h * h);
-            let third = (above2 - 2.0 * above + 2.0 * below - below2) / (2.0 * h * h * h);
-            for is_negative in [true, false] {
-                let mut motor = Setpoint::<f64>::default();
-                take_up.add(&mut motor, ticks, is_negative);
-                let sign = if is_negative { -1.0 } else { 1.0 };
-                for (found, (expected, tolerance)) in
-                    [motor.velocity_mm_s, motor.accel_mm_s2, motor.jerk_mm_s3].into_iter().zip([
-                        (sign * 0.02 * first / 0.01, 1e-4),
-                        (sign * 0.02 * second / 1e-4, 0.02),
-                        (sign * 0.02 * third / 1e-6, 100.0),
-                    ])
-                {
-                    assert!((found - expected).abs() < tolerance, "{ticks}: {found} {expected}");
-                }
-                let found = [motor.velocity_mm_s, motor.accel_mm_s2, motor.jerk_mm_s3];
-                peaks = core::array::from_fn(|order| peaks[order].max(found[order].abs()));
-            }
-        }
-        let most = [0.02 / 0.01, 0.02 / 1e-4, 0.02 / 1e-6];
-        for order in 0..3 {
-            let most = TAKE_UP_PEAKS[order] * most[order];
-            assert!(peaks[order] <= most * 1.000_001 && peaks[order] > 0.9 * most, "{peaks:?}");
-        }
     }
 
     /// To and fro, with reversals of all kinds: the offset moves by the play's share, once for each, and rests in between.
@@ -746,6 +332,44 @@ mod tests {
         holds::<f32>(1e-7);
         holds::<f64>(1e-9);
         holds::<Fixed>(1e-7);
+    }
+
+    /// Homed after motion in either direction, and then through the play to the other side: the load is where it is said to be.
+    #[test]
+    fn a_reference_holds_on_both_sides_of_the_play() {
+        for seed in 0..100 {
+            let random = Random::new(seed);
+            let (error, play_mm) = (random_table(&random), 0.1);
+            let backlash = Backlash { play_mm, take_up_s: 0.02 };
+            let compensation = AxisCompensation { backlash: Some(backlash), pitch_error: Some(error) };
+            let config = compensated::<f64>(compensation, 3).expect("valid");
+            let at = |mm: f64| Counts((mm / figures().mm_per_count).round() as i64);
+            let load = Position::from_mm(error.start_mm + random.unit()).expect("near");
+            for sign in [-1.0, 1.0] {
+                let mut axis = AxisState::<f64>::default();
+                let taken_up = |axis: &mut AxisState<f64>, velocity_mm_s: f64| {
+                    for _ in 0..60 {
+                        let setpoint = Setpoint { position: load, velocity_mm_s, ..Setpoint::default() };
+                        axis.tick(&config, &setpoint, &mut AxisOutput::default());
+                    }
+                };
+                taken_up(&mut axis, -sign);
+                taken_up(&mut axis, sign);
+                axis.refer(&config, at(5.0), load);
+                let off_mm = |axis: &AxisState<f64>, motor_mm: f64| {
+                    (axis.position(&config, at(motor_mm)) - load).to_mm().abs()
+                };
+                assert!(off_mm(&axis, 5.0) < 1e-8, "seed {seed}, {sign}");
+                taken_up(&mut axis, -sign);
+                assert!(off_mm(&axis, 5.0 - sign * play_mm) < 1e-8, "seed {seed}, {sign}");
+                // A take-up that is cut short counts as done.
+                let setpoint = Setpoint { position: load, velocity_mm_s: sign, ..Setpoint::default() };
+                axis.tick(&config, &setpoint, &mut AxisOutput::default());
+                let mut output = AxisOutput { counts: at(5.0), ..AxisOutput::default() };
+                let found = axis.stand_here(&config, &mut output);
+                assert!((found - load).to_mm().abs() < 1e-8, "seed {seed}, {sign}");
+            }
+        }
     }
 
     #[test]

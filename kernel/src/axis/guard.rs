@@ -27,8 +27,8 @@ use crate::num::Real;
 use crate::path::Setpoint;
 use crate::units::{Counts, Position};
 
-/// Time from one axis' sample to the next axis' \[ticks\].
-pub(crate) const SAMPLE_TICKS: u8 = 8;
+/// Time from one axis' sample to the next axis' \[ticks\]: an axis is sampled once in so many times the number of axes.
+pub const SAMPLE_TICKS: u8 = 8;
 /// Being beyond the travel by less is no fault \[mm\]: positions are rounded.
 const TRAVEL_ROUNDING_MM: f64 = 2.0e-3;
 /// Least value of a figure that is not 0.

@@ -57,6 +57,7 @@ mod scale;
 pub use compensation::{
     AxisCompensation, BACKLASH_MM_MAX, Backlash, COMPENSATION_POINTS_MAX, Compensation,
     PITCH_ERROR_SLOPE_MAX, PITCH_ERROR_SPACING_MM, PITCH_ERROR_UM_MAX, PitchError, TAKE_UP_PEAKS,
+    TAKE_UP_TICKS_MAX,
 };
 #[cfg(feature = "compensation")]
 use compensation::{CompensationConfig, CompensationState};
@@ -75,7 +76,9 @@ use serde::{Deserialize, Serialize};
 
 use check::{Check, fits};
 #[cfg(feature = "guards")]
-pub(crate) use guard::{AxisFault, SAMPLE_TICKS};
+pub(crate) use guard::AxisFault;
+#[cfg(feature = "guards")]
+pub use guard::SAMPLE_TICKS;
 use guard::{Guard, GuardConfig};
 
 use crate::fault::reaction::Reactions;

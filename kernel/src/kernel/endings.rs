@@ -56,6 +56,32 @@ fn any_of_many_axes_is_judged() {
     }
 }
 
+/// Encoders that fail in the same tick are all lost, though one of them alone is the fault; a reference finds an axis again.
+#[test]
+fn encoders_that_fail_together_are_all_lost() {
+    const AXES: usize = 31;
+    for first in 0..AXES {
+        let lost = [first, (first + 7) % AXES];
+        let config = guarded::<f32, AXES>(figures(), GUARD);
+        let mut kernel = Kernel::<f32, AXES>::new(&config, [Position::ZERO; AXES], [Counts(0); AXES]);
+        let mut streams = Streams::<f32, AXES, 2, 2>::new();
+        let (_, mut intake) = streams.split(RULES, [Position::ZERO; AXES]);
+        let mut bench = TestAxes::<AXES>::default();
+        kernel.enable(0);
+        kernel.tick(&mut intake, &mut bench);
+        for axis in lost {
+            bench.counts[axis] = Counts(123_456_789);
+        }
+        kernel.tick(&mut intake, &mut bench);
+        for axis in 0..AXES {
+            assert_eq!(kernel.has_lost_counts(axis), lost.contains(&axis), "axis {axis} of {lost:?}");
+        }
+        assert!(kernel.clear_fault().is_some() && kernel.has_lost_counts(first));
+        assert!(kernel.reference(first, Counts(0), Position::ZERO).is_some());
+        assert!(!kernel.has_lost_counts(first) && kernel.has_lost_counts(lost[1]));
+    }
+}
+
 /// A fault between the order to enable the drives and the tick that would do it.
 #[test]
 fn drives_that_are_not_on_are_not_enabled_for_a_ramp() {
