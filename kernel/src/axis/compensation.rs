@@ -347,11 +347,18 @@ mod tests {
             let load = Position::from_mm(error.start_mm + random.unit()).expect("near");
             for sign in [-1.0, 1.0] {
                 let mut axis = AxisState::<f64>::default();
+                // With a motor that is where it has to be.
+                let tick = |axis: &mut AxisState<f64>, velocity_mm_s: f64| {
+                    let setpoint = Setpoint { position: load, velocity_mm_s, ..Setpoint::default() };
+                    let counts = at((load - axis.offset).to_mm());
+                    axis.tick(
+                        &config,
+                        &setpoint,
+                        &mut AxisOutput { counts, set: load, ..AxisOutput::default() },
+                    );
+                };
                 let taken_up = |axis: &mut AxisState<f64>, velocity_mm_s: f64| {
-                    for _ in 0..60 {
-                        let setpoint = Setpoint { position: load, velocity_mm_s, ..Setpoint::default() };
-                        axis.tick(&config, &setpoint, &mut AxisOutput::default());
-                    }
+                    (0..60).for_each(|_| tick(axis, velocity_mm_s));
                 };
                 taken_up(&mut axis, -sign);
                 taken_up(&mut axis, sign);
@@ -361,13 +368,15 @@ mod tests {
                 };
                 assert!(off_mm(&axis, 5.0) < 1e-8, "seed {seed}, {sign}");
                 taken_up(&mut axis, -sign);
-                assert!(off_mm(&axis, 5.0 - sign * play_mm) < 1e-8, "seed {seed}, {sign}");
+                let off_mm = off_mm(&axis, 5.0 - sign * play_mm);
+                // Both places are rounded to counts.
+                assert!(off_mm < 1.01 * figures().mm_per_count, "seed {seed}, {sign}: {off_mm}");
                 // A take-up that is cut short counts as done.
-                let setpoint = Setpoint { position: load, velocity_mm_s: sign, ..Setpoint::default() };
-                axis.tick(&config, &setpoint, &mut AxisOutput::default());
+                tick(&mut axis, sign);
                 let mut output = AxisOutput { counts: at(5.0), ..AxisOutput::default() };
                 let found = axis.stand_here(&config, &mut output);
-                assert!((found - load).to_mm().abs() < 1e-8, "seed {seed}, {sign}");
+                // It is found from 0.1 mm off, in four rounds that leave a twentieth each.
+                assert!((found - load).to_mm().abs() < play_mm / 160_000.0, "seed {seed}, {sign}");
             }
         }
     }
