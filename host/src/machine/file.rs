@@ -175,12 +175,12 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine<AXES_MAX>, M
             return Err(refuse(at.clone(), expected));
         }
         if let (Some(at), Some(error)) = (&places.points_um, pitch_error) {
-            let most_mm_s2 = 0.5 * axis.drive_accel_mm_s2();
+            let most_mm_s2 = axis.drive_accel_mm_s2() - axis.accel_mm_s2;
             let accel_mm_s2 = error.curvature() * axis.feed_mm_s * axis.feed_mm_s;
             if accel_mm_s2 > most_mm_s2 {
                 let expected = format!(
-                    "a curve along which the motor needs at most {most_mm_s2:.0} mm/s² at feed_mm_s, half of what the drive \
-                     has (here {accel_mm_s2:.0})"
+                    "a curve along which the motor needs at most {most_mm_s2:.0} mm/s² at feed_mm_s, what the drive has \
+                     beside the axis (here {accel_mm_s2:.0})"
                 );
                 return Err(refuse(at.clone(), expected));
             }

@@ -537,8 +537,8 @@ fn rules_that_join_optional_keys() {
     assert_eq!(found.map(|_| ()), Err(format!("{place}{expected}")));
     // 6·0.0125/0.625²·300².
     let (found, place) = change("axis.compensation.pitch_error", "points_um", "[0, 12.5]");
-    let expected = "a curve along which the motor needs at most 6150 mm/s² at feed_mm_s, half of what the drive has \
-                    (here 17280)";
+    let expected = "a curve along which the motor needs at most 11800 mm/s² at feed_mm_s, what the drive has beside the \
+                    axis (here 17280)";
     assert_eq!(found.map(|_| ()), Err(format!("{place}{expected}")));
     assert!(change("axis.compensation.pitch_error", "points_um", "[0, 4.4]").0.is_ok());
     let many = |count: usize| format!("[{}]", vec!["1"; count].join(", "));
