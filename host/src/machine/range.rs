@@ -101,7 +101,7 @@ ranges! {
     Play: "a number above 0, at most 1", |value| value > 0.0 && value <= BACKLASH_MM_MAX;
     TakeUp: "a number from 0.00002 to 1", |value| (2e-5..=1.0).contains(&value);
     PlayOrNone: "a number from 0 to 1", |value| (0.0..=BACKLASH_MM_MAX).contains(&value);
-    Spacing: "a number from 0.01 to 1000", |value| value >= PITCH_ERROR_SPACING_MM[0] && value <= PITCH_ERROR_SPACING_MM[1];
+    Spacing: "a number from 0.01 to 1000", |value| (PITCH_ERROR_SPACING_MM[0]..=PITCH_ERROR_SPACING_MM[1]).contains(&value);
     PitchErrorPoint: "a number from -300 to 300", |value| value.abs() <= PITCH_ERROR_UM_MAX;
     Amplitude: "a number from 0 to 300", |value| (0.0..=PITCH_ERROR_UM_MAX).contains(&value);
     Angle: "a number from -360 to 360", |value| value.abs() <= 360.0;
