@@ -165,16 +165,13 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine<AXES_MAX>, M
                 return Err(refuse(at.clone(), expected));
             }
         }
-        if let (Some(at), Some(error)) = (&places.points_um, pitch_error)
-            && error.slope() > PITCH_ERROR_SLOPE_MAX
-        {
-            let expected = format!(
-                "at most {PITCH_ERROR_SLOPE_MAX} mm/mm from point to point (here {:.4})",
-                error.slope()
-            );
-            return Err(refuse(at.clone(), expected));
-        }
         if let (Some(at), Some(error)) = (&places.points_um, pitch_error) {
+            let slope = error.slope();
+            if slope > PITCH_ERROR_SLOPE_MAX {
+                let expected =
+                    format!("at most {PITCH_ERROR_SLOPE_MAX} mm/mm from point to point (here {slope:.4})");
+                return Err(refuse(at.clone(), expected));
+            }
             let most_mm_s2 = axis.drive_accel_mm_s2() - axis.accel_mm_s2;
             let accel_mm_s2 = error.curvature() * axis.feed_mm_s * axis.feed_mm_s;
             if accel_mm_s2 > most_mm_s2 {

@@ -34,22 +34,32 @@ fn the_longest_ramp_falls_in_every_tick() {
     assert!(kernel.clear_fault().is_some() && kernel.reaction().is_none());
 }
 
-/// As many axes as a round of samples has places for, each of them lost at every place of the round.
+/// As many axes as a round of samples has places for.
+const MANY: usize = 31;
+
+/// A kernel of many axes, at this place of a round of samples, after a tick in which the encoders of these axes jump.
+fn jumped(axes: &[usize], sample_ticks: u8) -> Kernel<f32, MANY> {
+    let config = guarded::<f32, MANY>(figures(), GUARD);
+    let mut kernel = Kernel::<f32, MANY>::new(&config, [Position::ZERO; MANY], [Counts(0); MANY]);
+    let mut streams = Streams::<f32, MANY, 2, 2>::new();
+    let (_, mut intake) = streams.split(RULES, [Position::ZERO; MANY]);
+    let mut bench = TestAxes::<MANY>::default();
+    kernel.enable(0);
+    kernel.tick(&mut intake, &mut bench);
+    kernel.guards.sample_ticks = sample_ticks;
+    for &axis in axes {
+        bench.counts[axis] = Counts(123_456_789);
+    }
+    kernel.tick(&mut intake, &mut bench);
+    kernel
+}
+
+/// Each of many axes is lost at every place of a round.
 #[test]
 fn any_of_many_axes_is_judged() {
-    const AXES: usize = 31;
-    for lost in 0..AXES {
-        for wait in 0..AXES * usize::from(crate::axis::SAMPLE_TICKS) {
-            let config = guarded::<f32, AXES>(figures(), GUARD);
-            let mut kernel = Kernel::<f32, AXES>::new(&config, [Position::ZERO; AXES], [Counts(0); AXES]);
-            let mut streams = Streams::<f32, AXES, 2, 2>::new();
-            let (_, mut intake) = streams.split(RULES, [Position::ZERO; AXES]);
-            let mut bench = TestAxes::<AXES>::default();
-            kernel.enable(0);
-            kernel.tick(&mut intake, &mut bench);
-            kernel.guards.sample_ticks = wait as u8;
-            bench.counts[lost] = Counts(123_456_789);
-            let fault = kernel.tick(&mut intake, &mut bench).fault.expect("lost");
+    for lost in 0..MANY {
+        for wait in 0..MANY * usize::from(crate::axis::SAMPLE_TICKS) {
+            let fault = jumped(&[lost], wait as u8).fault().expect("lost");
             let is_it = matches!(fault.kind, FaultKind::EncoderJump { axis, .. } if axis == lost);
             assert!(is_it, "axis {lost} at {wait}: {fault:?}");
         }
@@ -59,21 +69,10 @@ fn any_of_many_axes_is_judged() {
 /// Encoders that fail in the same tick are all lost, though one of them alone is the fault; a reference finds an axis again.
 #[test]
 fn encoders_that_fail_together_are_all_lost() {
-    const AXES: usize = 31;
-    for first in 0..AXES {
-        let lost = [first, (first + 7) % AXES];
-        let config = guarded::<f32, AXES>(figures(), GUARD);
-        let mut kernel = Kernel::<f32, AXES>::new(&config, [Position::ZERO; AXES], [Counts(0); AXES]);
-        let mut streams = Streams::<f32, AXES, 2, 2>::new();
-        let (_, mut intake) = streams.split(RULES, [Position::ZERO; AXES]);
-        let mut bench = TestAxes::<AXES>::default();
-        kernel.enable(0);
-        kernel.tick(&mut intake, &mut bench);
-        for axis in lost {
-            bench.counts[axis] = Counts(123_456_789);
-        }
-        kernel.tick(&mut intake, &mut bench);
-        for axis in 0..AXES {
+    for first in 0..MANY {
+        let lost = [first, (first + 7) % MANY];
+        let mut kernel = jumped(&lost, 0);
+        for axis in 0..MANY {
             assert_eq!(kernel.has_lost_counts(axis), lost.contains(&axis), "axis {axis} of {lost:?}");
         }
         assert!(kernel.clear_fault().is_some() && kernel.has_lost_counts(first));

@@ -147,10 +147,8 @@ pub fn write_homed<'a, const AXES: usize>(
         return write(header, Some(guards), items, out);
     }
     let mut entry = [0; ENTRY_MAX];
-    let length = postcard::to_slice(guards, &mut entry)?.len();
-    let behind = entry.get_mut(length..).unwrap_or_default();
-    let length = length + postcard::to_slice(homing, behind)?.len();
-    write_guarded(FORMAT, header, entry.get(..length).unwrap_or_default(), items, out)
+    let entry = postcard::to_slice(&(guards, homing), &mut entry)?;
+    write_guarded(FORMAT, header, entry, items, out)
 }
 
 /// [`write_homed`] with the compensation of the axes.
@@ -170,8 +168,8 @@ pub fn write_compensated<'a, const AXES: usize>(
         return write_homed(header, guards, homing, items, out);
     }
     let mut entry = [0; ENTRY_MAX];
-    let length = postcard::to_slice(&(guards, homing, compensation), &mut entry)?.len();
-    write_guarded(FORMAT_COMPENSATED, header, entry.get(..length).unwrap_or_default(), items, out)
+    let entry = postcard::to_slice(&(guards, homing, compensation), &mut entry)?;
+    write_guarded(FORMAT_COMPENSATED, header, entry, items, out)
 }
 
 /// Writes with guards that are written already.

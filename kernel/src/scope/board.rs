@@ -7,9 +7,10 @@
 use heapless::spsc::{Consumer, Queue};
 
 use super::log::{Handed, Log};
-use super::record::{Recorder, TripCount};
+use super::record::Recorder;
 use super::ring::{Ring, TicksOut};
 use super::snapshot::Snapshot;
+use super::tick_record::TripCount;
 use super::wire::{Expected, HANDED, TRIP, Writer};
 use crate::fault::FaultKind;
 use crate::hal::MachineInputs;

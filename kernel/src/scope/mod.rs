@@ -12,7 +12,7 @@
 //!                                                       items ─────┘
 //! ```
 //!
-//! - `record`, `ring`: what a tick consumed, as the tick leaves it; faults and failures of the hardware, too;
+//! - `tick_record`, `record`, `ring`: what a tick consumed, as the tick leaves it; faults and failures of the hardware, too;
 //! - `log`: the lists of feed that live control hands to the tick, and what else the background does;
 //! - `snapshot`: the kernel's state between two ticks;
 //! - `wire`: a tick as bytes;
@@ -34,6 +34,7 @@ mod ring;
 #[cfg(test)]
 mod ring_tests;
 mod snapshot;
+mod tick_record;
 mod wire;
 /// Those of the ring; its check has its own.
 mod words {

@@ -7,8 +7,9 @@ use heapless::Vec;
 
 use super::board::{LAST_PIECE, PIECE, TICKS};
 use super::log::{Begun, Command, Handed};
-use super::record::{Answers, TickRecord, TripCount, Trips};
+use super::record::{Answers, Trips};
 use super::snapshot::Snapshot;
+use super::tick_record::{TickRecord, TripCount};
 use super::wire::{Bytes, Consumed, Expected, HANDED, TRIP};
 use crate::axis::AxesConfig;
 use crate::fault::FaultKind;

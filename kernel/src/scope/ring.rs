@@ -3,7 +3,7 @@
 //!
 //! Single producer, single consumer, lock-free, as the streams are. One place stays empty.
 
-use super::record::{TickRecord, TripCount};
+use super::tick_record::{TickRecord, TripCount};
 use super::words::{AtomicBool, AtomicU8, AtomicU16, AtomicU32, AtomicUsize, Ordering};
 use crate::hal::AxisInputs;
 use crate::num::Real;

@@ -1,7 +1,7 @@
 //! The ring by itself; its file is compiled by the check of its hand-over, too.
 
-use super::record::TripCount;
 use super::ring::Ring;
+use super::tick_record::TripCount;
 use crate::axis::AxisOutput;
 use crate::exec::Executor;
 use crate::hal::MachineInputs;

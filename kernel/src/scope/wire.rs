@@ -5,7 +5,8 @@
 //!
 //! Instead of flags a byte may say that something else follows: what was handed to the tick, a fault that the board has found.
 
-use super::record::{Check, TickRecord, TripCount, failed};
+use super::record::{Check, failed};
+use super::tick_record::{TickRecord, TripCount};
 use crate::hal::{AxisInputs, MachineInputs};
 
 /// Instead of flags: what was handed to the tick that comes next.

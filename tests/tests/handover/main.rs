@@ -16,6 +16,8 @@
 #![allow(clippy::duplicate_mod, reason = "the same files with the words of each check")]
 #![allow(dead_code, unreachable_pub, reason = "the kernel's files hold more than the checks use")]
 
+mod interleavings;
+mod interrupts;
 mod one_core;
 mod scope_one_core;
 mod scope_two_cores;

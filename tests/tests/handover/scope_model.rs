@@ -9,8 +9,8 @@ use motion_kernel::path::Setpoint;
 use motion_kernel::trace::Trace;
 use motion_kernel::units::{Counts, DacCode, Position};
 
-use super::record::{TickRecord, TripCount};
 use super::ring::{TicksIn, TicksOut};
+use super::tick_record::{TickRecord, TripCount};
 
 /// Room for two ticks.
 pub(super) const PLACES: usize = 3;
@@ -68,7 +68,7 @@ impl Background<'_> {
         let TickRecord { counts: [counts], set: [set], codes: [code], trips, .. } = record;
         assert_eq!(
             (counts, set, code.0 as u32, trips),
-            (number, number, number, TripCount::of(number as u8))
+            (number, number, number, TripCount::New(number as u8))
         );
         match self.last {
             Some(last) => assert_eq!(number, last + 1, "one is missing between them"),

@@ -5,63 +5,17 @@
 mod ring;
 #[path = "scope_model.rs"]
 mod model;
-#[path = "scope_record.rs"]
-mod record;
+#[path = "../../../kernel/src/scope/tick_record.rs"]
+mod tick_record;
 
 use model::{Background, PLACES, Tick};
 use ring::Ring;
 
-/// Loom's words.
-mod words {
-    use std::sync::{Mutex, OnceLock};
-
-    pub(super) use loom::sync::atomic::Ordering;
-    use loom::thread::{ThreadId, current};
-
-    /// Loom can't make words in a constant: this one is made where it is first touched, before the threads begin. What its
-    /// writer reads is what it wrote last, and loom does not hear of it: `handover` of `two_cores` says why.
-    macro_rules! word {
-        ($($name:ident: $of:ty),*) => {$(
-            #[derive(Debug)]
-            pub(super) struct $name {
-                initial: $of,
-                word: OnceLock<loom::sync::atomic::$name>,
-                written: Mutex<Option<(ThreadId, $of)>>,
-            }
-
-            impl $name {
-                pub(super) const fn new(initial: $of) -> Self {
-                    Self { initial, word: OnceLock::new(), written: Mutex::new(None) }
-                }
-
-                fn word(&self) -> &loom::sync::atomic::$name {
-                    self.word.get_or_init(|| loom::sync::atomic::$name::new(self.initial))
-                }
-
-                pub(super) fn load(&self, ordering: Ordering) -> $of {
-                    let written = *self.written.lock().expect("no panic before");
-                    match written {
-                        Some((writer, value)) if writer == current().id() => value,
-                        _ => self.word().load(ordering),
-                    }
-                }
-
-                pub(super) fn store(&self, value: $of, ordering: Ordering) {
-                    *self.written.lock().expect("no panic before") = Some((current().id(), value));
-                    self.word().store(value, ordering);
-                }
-            }
-        )*};
-    }
-    word!(AtomicBool: bool, AtomicU8: u8, AtomicU16: u16, AtomicU32: u32, AtomicUsize: usize);
-}
+use crate::interleavings::{in_interleavings, words};
 
 /// So many ticks and reads at the same time, with so many preemptions at most; without a bound in every interleaving.
 fn check(ticks: u32, reads: u32, preemptions: Option<usize>) {
-    let mut builder = loom::model::Builder::new();
-    builder.max_branches = 10_000;
-    builder.preemption_bound = preemptions;
-    builder.check(move || {
+    in_interleavings(preemptions, move || {
         let ring = Box::leak(Box::new(Ring::<1, PLACES>::new()));
         let (enters, leaves) = ring.split();
         let mut background = Background { ticks: leaves, last: None, latest: 0 };

@@ -49,49 +49,12 @@ mod ring;
 use mailbox::Mailbox;
 use model::{Background, Tick};
 
+use crate::interleavings::in_interleavings;
+
 /// Loom's words and memory.
 mod handover {
-    use std::sync::{Mutex, OnceLock};
-
     pub(super) use super::ring::Consumer;
-    pub(super) use loom::sync::atomic::Ordering;
-    use loom::thread::{ThreadId, current};
-
-    /// Loom can't make words in a constant: this one is made where it is first touched, before the threads begin.
-    ///
-    /// Each word has one writer. What that one reads is what it wrote last, and loom does not hear of it: loom remembers one
-    /// access of a word, so that a read before each write would hide from it that the other thread has read too, and it
-    /// would leave out the interleavings in which the write comes first.
-    #[derive(Debug)]
-    pub(super) struct AtomicU32 {
-        initial: u32,
-        word: OnceLock<loom::sync::atomic::AtomicU32>,
-        written: Mutex<Option<(ThreadId, u32)>>,
-    }
-
-    impl AtomicU32 {
-        pub(super) const fn new(initial: u32) -> Self {
-            Self { initial, word: OnceLock::new(), written: Mutex::new(None) }
-        }
-
-        fn word(&self) -> &loom::sync::atomic::AtomicU32 {
-            self.word.get_or_init(|| loom::sync::atomic::AtomicU32::new(self.initial))
-        }
-
-        pub(super) fn load(&self, ordering: Ordering) -> u32 {
-            // Loom may go to the other thread in a load: nothing is locked then.
-            let written = *self.written.lock().expect("no panic before");
-            match written {
-                Some((writer, value)) if writer == current().id() => value,
-                _ => self.word().load(ordering),
-            }
-        }
-
-        pub(super) fn store(&self, value: u32, ordering: Ordering) {
-            *self.written.lock().expect("no panic before") = Some((current().id(), value));
-            self.word().store(value, ordering);
-        }
-    }
+    pub(super) use crate::interleavings::words::{AtomicU32, Ordering};
 
     /// Memory that must not be read and written at a time.
     #[derive(Default)]
@@ -114,10 +77,7 @@ loom::lazy_static! {
 
 /// So many changes and ticks at the same time, with so many preemptions at most; without a bound in every interleaving.
 fn check(changes: u32, ticks: u32, preemptions: Option<usize>) {
-    let mut builder = loom::model::Builder::new();
-    builder.max_branches = 10_000;
-    builder.preemption_bound = preemptions;
-    builder.check(move || {
+    in_interleavings(preemptions, move || {
         let mailbox: &'static Mailbox = &MAILBOX;
         let rings = model::rings();
         let mut background = Background { mailbox, rings: &rings, current: 0, next: None };
