@@ -208,3 +208,44 @@ impl<'a, R: Real, const AXES: usize, const ROWS: usize, const AFTER: usize>
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use motion_kernel::queue::LiveStreams;
+
+    use super::*;
+    use crate::fixture::{AXES, IdealDrives, machine};
+
+    /// What counts is the first contact since the switch was found open, however often it opens again before the next look.
+    #[test]
+    fn a_bouncing_switch_counts_from_its_first_contact() {
+        let machine = machine();
+        let header = *machine.header();
+        let mut flight = FlightRecorder::<f32, AXES, 16, 8>::new();
+        let mut streams = LiveStreams::<f32, AXES, 64, 16>::new();
+        let (_, intake) = streams.split(header.rules, header.start);
+        let kernel = Kernel::new(&machine.axes, header.start, [Counts(0); AXES]);
+        let mut control = Control::new(kernel, intake, &mut flight);
+        let mut drives = IdealDrives::new();
+        let mut ticks = |control: &mut Control<'_, f32, AXES, 16, 8>, contacts: &[bool]| {
+            for &is_closed in contacts {
+                drives.contact = Some(is_closed);
+                drives.counts[0] += 10.0;
+                control.tick(None, None, &mut drives);
+            }
+        };
+        ticks(&mut control, &[false]);
+        assert_eq!(control.home_counts(0), None);
+        ticks(&mut control, &[false, true, false, true, true, false, true]);
+        assert_eq!(control.home_counts(0), Some(Counts(30)));
+        // It stays so, until it is found open.
+        ticks(&mut control, &[true, true]);
+        assert_eq!(control.home_counts(0), Some(Counts(30)));
+        ticks(&mut control, &[false]);
+        assert_eq!(control.home_counts(0), None);
+        ticks(&mut control, &[true, false, true]);
+        assert_eq!(control.home_counts(0), Some(Counts(120)));
+        // Another axis is looked at from now on.
+        assert_eq!(control.home_counts(1), None);
+    }
+}

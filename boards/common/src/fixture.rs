@@ -59,11 +59,13 @@ pub(crate) fn end() -> [Position; AXES] {
 
 /// Drives without inertia: a velocity is there in the tick that asks for it.
 pub(crate) struct IdealDrives {
-    counts: [f64; AXES],
+    pub(crate) counts: [f64; AXES],
     counts_per_code: [f64; AXES],
     mm_per_count: [f64; AXES],
     /// Home switches, and a latch for each axis that has an index.
     pub(crate) homes: SimHomes<AXES>,
+    /// What the first axis' home switch says, wherever the axis is.
+    pub(crate) contact: Option<bool>,
     pub(crate) is_enabled: bool,
     pub(crate) now: u32,
     /// Ticks in which outputs were switched.
@@ -105,7 +107,11 @@ impl IndexLatch for IdealDrives {
 impl Inputs<AXES> for IdealDrives {
     type Error = Infallible;
     fn read_inputs(&mut self) -> Result<MachineInputs<AXES>, Infallible> {
-        Ok(self.homes.with_switches(MachineInputs::HEALTHY))
+        let mut inputs = self.homes.with_switches(MachineInputs::HEALTHY);
+        if let Some(is_closed) = self.contact {
+            inputs.axes[0] = inputs.axes[0].with_home(is_closed);
+        }
+        Ok(inputs)
     }
 }
 
@@ -142,6 +148,7 @@ impl IdealDrives {
             counts_per_code,
             mm_per_count: machine().header().axes.map(|axis| axis.mm_per_count),
             homes: SimHomes::NONE,
+            contact: None,
             is_enabled: false,
             now: 0,
             switched: Vec::new(),
