@@ -10,6 +10,7 @@ use motion_host::machine::Machine;
 use motion_host::planning::Plan;
 use motion_host::simulate::hardware::{Simulated, SimulatedHardware, simulated};
 use motion_host::simulate::{Hardware, Job, Number, RunOptions, run_on};
+use motion_host::trace::TracedFault;
 use motion_kernel::axis::{AxisCompensation, Backlash, BedInverse, DriveInverse, Feedforward, PitchError};
 use motion_kernel::hal::{
     DriveEnable, Encoder, Inputs, MachineInputs, OutputState, Outputs, VelocityChannel,
@@ -160,6 +161,12 @@ struct Run {
 }
 
 fn run(program: &str, machine: &Machine, number: Number) -> Run {
+    let (run, faults) = run_with_faults(program, machine, number);
+    assert!(faults.is_empty(), "{faults:?}");
+    run
+}
+
+fn run_with_faults(program: &str, machine: &Machine, number: Number) -> (Run, Vec<TracedFault>) {
     let plan: Plan = motion_tests::check::planned(program, machine).expect("a plan");
     let simulated = simulated(machine).expect("a machine");
     let hardware = SimulatedHardware::new(&simulated).expect("converters");
@@ -172,9 +179,8 @@ fn run(program: &str, machine: &Machine, number: Number) -> Run {
         told_mm.push([x.act_mm, y.act_mm]);
     })
     .expect("a run");
-    assert!(summary.faults.is_empty(), "{:?}", summary.faults);
     let loads_mm = watched.loads_mm;
-    Run { set_mm, told_mm, loads_mm }
+    (Run { set_mm, told_mm, loads_mm }, summary.faults)
 }
 
 impl Run {
@@ -257,6 +263,35 @@ fn the_loads_position_is_told() {
             .map(|screws| run(CIRCLE, &machine(screws, is_inverted), Number::F32).untold_um());
         println!("told and true differ by {errors_um:.2} µm, with compensation by {compensated_um:.2} µm");
         assert!(errors_um > 1e3 * PLAY_MM && compensated_um < 0.5, "{errors_um} {compensated_um}");
+    }
+}
+
+/// A machine whose X has this play alone, taken up as fast as its machine file may say.
+fn worn(play_mm: f64, is_inverted: bool) -> Machine {
+    let mut machine = machine(Screws::Ideal, is_inverted);
+    let axis = &mut machine.axes[0];
+    let backlash = Some(Backlash { play_mm, take_up_s: axis.take_up_s(play_mm) });
+    axis.screw = ScrewParameters { pitch_error: None, backlash_mm: play_mm };
+    axis.compensation = Some(AxisCompensation { backlash, pitch_error: None });
+    machine
+}
+
+/// The fastest take-up that a machine file may ask for is no fault, wherever in a round of the guards' samples a reversal comes.
+#[test]
+fn the_fastest_take_up_is_no_fault() {
+    // Reversals within motion, at the axis' acceleration, and from rest.
+    let program = |wait_s: f64| {
+        format!("G21 G90 G61\nG4 P{wait_s}\nG0 X8\nG0 X0\nG64 P0\nG3 X0 Y0 I3 J0 F2150\nG1 X-1\nX0\nM2\n")
+    };
+    for is_inverted in [false, true] {
+        for play_mm in [0.005, 0.02, 0.05, 0.1, 0.3, 1.0] {
+            let machine = worn(play_mm, is_inverted);
+            for ticks in 0..24 {
+                let wait_s = f64::from(ticks) * machine.tick_s;
+                let (_, faults) = run_with_faults(&program(wait_s), &machine, Number::F32);
+                assert!(faults.is_empty(), "{play_mm} mm, inverse {is_inverted}, {ticks} ticks: {faults:?}");
+            }
+        }
     }
 }
 

@@ -152,13 +152,6 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine<AXES_MAX>, M
                 );
                 return Err(refuse(at.clone(), expected));
             }
-            let least_s = axis.unsuspected_take_up_s(backlash.play_mm, axes.len(), tick_s);
-            if backlash.take_up_s < least_s {
-                let expected = format!(
-                    "at least {least_s:.6}: load_accel_mm_s2 of the axis' guard takes faster ones for a runaway"
-                );
-                return Err(refuse(at.clone(), expected));
-            }
             let ticks = (backlash.take_up_s / tick_s).round();
             if !(1.0..=TAKE_UP_TICKS_MAX).contains(&ticks) {
                 let expected = format!("from 1 to {TAKE_UP_TICKS_MAX} ticks of tick_s = {tick_s}");
@@ -177,7 +170,7 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine<AXES_MAX>, M
             if accel_mm_s2 > most_mm_s2 {
                 let expected = format!(
                     "a curve along which the motor needs at most {most_mm_s2:.0} mm/s² at feed_mm_s, what the drive has \
-                     beside the axis (here {accel_mm_s2:.0})"
+                     beyond accel_mm_s2 (here {accel_mm_s2:.0})"
                 );
                 return Err(refuse(at.clone(), expected));
             }

@@ -478,7 +478,7 @@ pub const KEY_TABLES: &[KeyTable] = &[
                 "s",
                 TakeUp::EXPECTED,
                 "How long that takes; so long that the motor needs at most feed_mm_s and half of the acceleration that the \
-                 drive has, and that the guard does not take it for a runaway.",
+                 drive has.",
             ),
         ],
     ),

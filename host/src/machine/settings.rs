@@ -6,7 +6,7 @@ use hal_sim::{
 };
 use motion_kernel::axis::{
     AxesConfig, AxesError, AxisCompensation, AxisFigures, Compensation, Feedforward, Gains, GuardFigures,
-    Guards, SAMPLE_TICKS, TAKE_UP_PEAKS,
+    Guards, TAKE_UP_PEAKS,
 };
 use motion_kernel::fault::{Reaction, Reactions};
 use motion_kernel::homing::HomingConfig;
@@ -558,16 +558,6 @@ impl AxisSettings {
     #[must_use]
     pub fn drive_accel_mm_s2(&self) -> f64 {
         self.drive.accel_limit_mm_s2 / (1.0 + self.drive.load_inertia_ratio)
-    }
-
-    /// The shortest time in which its motor may go through a play without the guard of a machine of `axes` axes taking that for
-    /// a runaway \[s\]: from one sample to the next its velocity changes by less than the load that is allowed for, beside the axis'
-    /// own acceleration. Any time where the guard allows for no more than that.
-    #[must_use]
-    pub fn unsuspected_take_up_s(&self, play_mm: f64, axes: usize, tick_s: f64) -> f64 {
-        let round_s = f64::from(SAMPLE_TICKS) * axes as f64 * tick_s;
-        let room_mm_s = (self.guard_figures(tick_s).load_accel_mm_s2 - self.accel_mm_s2) * round_s;
-        if room_mm_s > 0.0 { TAKE_UP_PEAKS[0] * play_mm / room_mm_s } else { 0.0 }
     }
 
     /// The axis in the kernel's terms.

@@ -232,6 +232,11 @@ impl<R: Real> AxisState<R> {
         }
     }
 
+    /// Whether a take-up is under way.
+    pub(super) fn takes_up(&self) -> bool {
+        self.compensation.ticks_left > 0
+    }
+
     /// A take-up that was cut short counts as done.
     pub(super) fn end_take_up(&mut self) {
         self.compensation.ticks_left = 0;

@@ -13,7 +13,8 @@
 //!   of it each. If more than half of it shows in the counts, the encoder jumped, otherwise the set-point;
 //! - **encoder lost**: no counts while the command is above `moving_mm_s`, over `response_s`;
 //! - **runaway**: the axis loses velocity towards its command at more than `load_accel_mm_s2`, which no load
-//!   does, or moves against its command without braking for longer than `response_s`;
+//!   does, or moves against its command without braking for longer than `response_s`. The first is not judged
+//!   within `response_s` of a take-up of backlash;
 //! - **saturation**: the output is at its limit in every sample over `saturation_s`;
 //! - **soft limit**: the set position is beyond the travel and moves farther out.
 //!
@@ -27,8 +28,8 @@ use crate::num::Real;
 use crate::path::Setpoint;
 use crate::units::{Counts, Position};
 
-/// Time from one axis' sample to the next axis' \[ticks\]: an axis is sampled once in so many times the number of axes.
-pub const SAMPLE_TICKS: u8 = 8;
+/// Time from one axis' sample to the next axis' \[ticks\].
+pub(crate) const SAMPLE_TICKS: u8 = 8;
 /// Being beyond the travel by less is no fault \[mm\]: positions are rounded.
 const TRAVEL_ROUNDING_MM: f64 = 2.0e-3;
 /// Least value of a figure that is not 0.
@@ -237,6 +238,9 @@ pub(super) struct Guard<R> {
     /// Distance moved at the sample before the first of these \[mm\].
     against_from_mm: R,
     saturated_samples: u16,
+    /// Samples until the drive has responded to a take-up. The motor alone goes through the play, and faster than by load.
+    #[cfg(feature = "compensation")]
+    take_up_samples: u16,
     /// The next jump is no fault: the machine was told to stand while it was moving.
     is_excused: bool,
 }
@@ -257,6 +261,20 @@ impl<R: Real> Guard<R> {
         (self.last, self.still_samples, self.against_samples, self.saturated_samples) =
             (Sample::default(), 0, 0, 0);
         self.command_mm_s = R::ZERO;
+    }
+
+    /// Notes a tick of a take-up.
+    #[cfg(feature = "compensation")]
+    pub(super) fn take_up(&mut self, config: &AxisConfig<R>) {
+        self.take_up_samples = config.guard.response_samples.saturating_add(1);
+    }
+
+    /// Whether the axis has moved as it does with its load ever since the last sample but one.
+    fn moves_load(&self) -> bool {
+        #[cfg(feature = "compensation")]
+        return self.take_up_samples == 0;
+        #[cfg(not(feature = "compensation"))]
+        true
     }
 
     #[inline]
@@ -398,7 +416,7 @@ impl<R: Real> Guard<R> {
     fn runs_away(&self, config: &AxisConfig<R>, now_mm: R, by_load_mm: R) -> bool {
         let [latest, before, first] = self.counts;
         // Counts that stand still are another fault.
-        if !self.last.is_taken || latest == before && before == first {
+        if !self.last.is_taken || !self.moves_load() || latest == before && before == first {
             return false;
         }
         let guard = &config.guard;
@@ -455,6 +473,10 @@ impl<R: Real> Guard<R> {
         self.still_samples = count(self.still_samples, goes_on && is_still);
         self.against_samples = count(self.against_samples, goes_on && is_against);
         self.saturated_samples = count(self.saturated_samples, output.saturated);
+        #[cfg(feature = "compensation")]
+        {
+            self.take_up_samples = self.take_up_samples.saturating_sub(1);
+        }
         self.last = Sample { is_taken: true, counts: self.counts[0], moved_mm, commanded };
         if runs_away || self.against_samples >= guard.response_samples {
             Some(AxisFault::Runaway)

@@ -76,9 +76,7 @@ use serde::{Deserialize, Serialize};
 
 use check::{Check, fits};
 #[cfg(feature = "guards")]
-pub(crate) use guard::AxisFault;
-#[cfg(feature = "guards")]
-pub use guard::SAMPLE_TICKS;
+pub(crate) use guard::{AxisFault, SAMPLE_TICKS};
 use guard::{Guard, GuardConfig};
 
 use crate::fault::reaction::Reactions;
@@ -336,6 +334,9 @@ impl<R: Real> AxisState<R> {
         #[cfg(feature = "compensation")]
         if let Some(compensation) = &config.compensation {
             let motor = self.compensate(compensation, setpoint, output.set);
+            if self.takes_up() {
+                self.guard.take_up(config);
+            }
             return self.regulate(config, &motor, output);
         }
         self.regulate(config, setpoint, output);

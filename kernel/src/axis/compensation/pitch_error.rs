@@ -40,7 +40,7 @@ pub struct PitchError {
 impl PitchError {
     /// The table through `points_um` \[µm\], each rounded to 10 nm. `None` for fewer points than 2 or more than
     /// [`COMPENSATION_POINTS_MAX`], and for one beyond [`PITCH_ERROR_UM_MAX`]. The other figures are checked where the
-    /// axes are [compensated](AxesConfig::compensated).
+    /// axes are [compensated](super::super::AxesConfig::compensated).
     #[must_use]
     pub fn new(start_mm: f64, spacing_mm: f64, points_um: &[f64], repeats: bool) -> Option<Self> {
         let count = points_um.len();
