@@ -132,6 +132,14 @@ impl Compared {
     pub fn half_widths_off(&self) -> f64 {
         (self.found.value - self.truth).abs() / self.found.half_width_95
     }
+
+    fn words(&self) -> String {
+        let (name, off, Estimate { value, half_width_95 }) = (self.name, self.half_widths_off(), self.found);
+        format!(
+            "{name} off by {off:.1} half-widths: {value:.5e} ± {half_width_95:.1e}, is {:.5e}",
+            self.truth
+        )
+    }
 }
 
 /// Every parameter that was found, per unit of the inertia moved; those of the bed if there is one and one
@@ -211,12 +219,11 @@ impl Surveyed {
     pub fn wrong(&self) -> Vec<String> {
         let found = self.found.iter().flatten();
         let off = found.filter(|one| !(one.half_widths_off() <= HALF_WIDTHS_MAX));
-        let mut wrong: Vec<String> =
-            off.map(|one| format!("{} off by {:.1} half-widths", one.name, one.half_widths_off())).collect();
+        let mut wrong: Vec<String> = off.map(Compared::words).collect();
         if self.found.is_ok() {
             match (self.axis.drive.bed, self.has_bed) {
                 (Some(bed), false) if bed.mass_ratio > MISSED_RATIO_MAX => {
-                    wrong.push(format!("bed missed at a mass ratio of {:.3}", bed.mass_ratio));
+                    wrong.push(format!("missed: {}", bed_words(bed)));
                 }
                 (None, true) => wrong.push("a bed that is not there".to_owned()),
                 _ => {}
@@ -224,11 +231,19 @@ impl Surveyed {
         }
         let margins_off = self.margins.as_ref().map_or(0.0, margins_off);
         if !(margins_off <= MARGINS_OFF_MAX) {
-            wrong.push(format!("margins off by {:.1} %", 100.0 * margins_off));
+            let bed = self.axis.drive.bed.map_or_else(String::new, |bed| format!(", {}", bed_words(bed)));
+            wrong.push(format!("margins off by {:.1} %{bed}", 100.0 * margins_off));
         }
         wrong.extend(self.circles.worse.iter().cloned());
         wrong
     }
+}
+
+fn bed_words(bed: BedMode) -> String {
+    format!(
+        "bed of {:.1} Hz, damping {:.4}, mass ratio {:.3}",
+        bed.frequency_hz, bed.damping_ratio, bed.mass_ratio
+    )
 }
 
 /// Circles of a drive, before and after tuning.

@@ -6,6 +6,8 @@
 use core::convert::Infallible;
 
 use hal_sim::{PitchErrorParameters, ScrewParameters};
+use motion_host::drive::screw::{Survey, measure};
+use motion_host::identify::{ScrewReference, identify_screw};
 use motion_host::machine::Machine;
 use motion_host::planning::Plan;
 use motion_host::simulate::hardware::{Simulated, SimulatedHardware, simulated};
@@ -293,6 +295,32 @@ fn the_fastest_take_up_is_no_fault() {
             }
         }
     }
+}
+
+/// Play and error found from where an instrument sees the load compensate as well as those that are known.
+#[test]
+fn a_screw_that_was_measured_is_compensated() {
+    let mut machine = machine(Screws::WithErrors, true);
+    for axis in 0..2 {
+        // X over its few turns here, Y over more than it needs.
+        let ends_mm = [[-5.0, 45.0], [-25.0, 125.0]][axis];
+        let survey = Survey { axis, ends_mm, places: 64, rounds: 1, rest_s: 3.0 };
+        let readings = measure(&machine, &survey).expect("a measurement");
+        let found = identify_screw(&readings, Some(PITCH_MM), ScrewReference::default()).expect("a screw");
+        let play = found.backlash_mm;
+        assert!((play.value - PLAY_MM).abs() < 2.0 * play.half_width_95, "{play:?}");
+        assert!(play.half_width_95 < 2e-4, "{play:?}");
+        let table = found.pitch_error.expect("an error").table;
+        assert!(table.repeats, "{table:?}");
+        let backlash = Some(Backlash { play_mm: play.value, take_up_s: TAKE_UP_S });
+        machine.axes[axis].compensation = Some(AxisCompensation { backlash, pitch_error: Some(table) });
+    }
+    let off_um = |machine: &Machine| run(CIRCLE, machine, Number::F32).off_path_um();
+    let (known_um, found_um) = (off_um(&self::machine(Screws::Compensated, true)), off_um(&machine));
+    println!(
+        "a circle: {known_um} µm with the errors that are known, {found_um} µm with those that were found"
+    );
+    assert!(found_um < known_um + 0.2, "{known_um} {found_um}");
 }
 
 /// Homed anew where the load is known, wherever that is in a turn, the set positions are the load's again.

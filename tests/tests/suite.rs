@@ -32,6 +32,7 @@ mod programs;
 mod recording;
 mod regulators;
 mod samples;
+mod screw;
 mod streams;
 mod stringer;
 mod tuning;

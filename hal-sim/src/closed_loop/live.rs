@@ -227,13 +227,30 @@ pub fn close_guarded<
     Ok((producer, closed))
 }
 
-/// The axes of a program with its guards.
+/// The axes of a program with its guards and its compensation.
 fn guarded<R: Real, const AXES: usize>(program: &Reader<'_, AXES>) -> Result<AxesConfig<R, AXES>, LoopError> {
-    let axes = regulated(program.header())?;
+    let axes = compensated(regulated(program.header())?, program)?;
     match program.guards().map_err(LoopError::Program)? {
         Some(guards) => axes.guarded(&guards, program.header().tick_s).map_err(LoopError::Axes),
         None => Ok(axes),
     }
+}
+
+#[cfg(feature = "compensation")]
+fn compensated<R: Real, const AXES: usize>(
+    axes: AxesConfig<R, AXES>,
+    program: &Reader<'_, AXES>,
+) -> Result<AxesConfig<R, AXES>, LoopError> {
+    let compensation = program.compensation().map_err(LoopError::Program)?;
+    axes.compensated(&compensation, program.header().tick_s).map_err(LoopError::Axes)
+}
+
+#[cfg(not(feature = "compensation"))]
+fn compensated<R: Real, const AXES: usize>(
+    axes: AxesConfig<R, AXES>,
+    program: &Reader<'_, AXES>,
+) -> Result<AxesConfig<R, AXES>, LoopError> {
+    if program.is_compensated() { Err(LoopError::Compensated) } else { Ok(axes) }
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ use crate::drive::recorded::RecordedError;
 use crate::files::FilesError;
 use crate::flight::FlightError;
 use crate::gcode::GcodeError;
+use crate::identify::ScrewError;
 use crate::machine::{AxisError, MachineError};
 use crate::planning::PlanningError;
 use crate::points::PointsError;
@@ -151,6 +152,14 @@ pub enum CliError {
     /// A recording of an axis can't be used.
     #[error(transparent)]
     Recorded(#[from] RecordedError),
+    /// Measured positions do not determine a screw.
+    #[error("{name}: {source}")]
+    Screw {
+        /// The file, or the simulated machine.
+        name: String,
+        /// Why not.
+        source: ScrewError,
+    },
     /// The points have no spline.
     #[error("{place}: found {source}")]
     Spline {

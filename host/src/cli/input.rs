@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::error::CliError;
 use crate::files::STANDARD_INPUT;
 use crate::gcode::{self, Axis, GcodeError, ParameterFile, Program, ReadOptions, Refusal, ToolTable};
-use crate::machine::{AnyMachine, Machine};
+use crate::machine::{AnyMachine, Machine, REFERENCE_TOML};
 
 /// What G-code is read with.
 #[derive(Clone, Debug, PartialEq, Args, Serialize, Deserialize)]
@@ -156,16 +156,39 @@ pub(super) fn any_machine(path: Option<&PathBuf>) -> Result<AnyMachine, CliError
 /// Reads the file of a machine of X, Y and Z, in this order, for commands that know their axes by it; without a file, the
 /// reference machine.
 pub(super) fn xyz_machine(path: Option<&PathBuf>) -> Result<Machine, CliError> {
-    let Some(path) = path else { return Ok(Machine::reference()) };
-    let (name, text) = machine_text(path)?;
-    let machine = Machine::from_toml(&name, &text)?;
-    if machine.axes.each_ref().map(|axis| axis.letter) == [Axis::X, Axis::Y, Axis::Z].map(Some) {
-        return Ok(machine);
+    if path.is_none() { Ok(Machine::reference()) } else { MachineText::read(path)?.xyz_machine() }
+}
+
+/// A machine file, to be changed.
+pub(super) struct MachineText {
+    pub(super) name: String,
+    pub(super) text: String,
+}
+
+impl MachineText {
+    /// Reads the file; without one, that of the reference machine.
+    pub(super) fn read(path: Option<&PathBuf>) -> Result<Self, CliError> {
+        let Some(path) = path else {
+            return Ok(Self { name: "reference.toml".to_owned(), text: REFERENCE_TOML.to_owned() });
+        };
+        let (name, text) = machine_text(path)?;
+        Ok(Self { name, text })
     }
-    let letters = machine.axes.iter().filter_map(|axis| axis.letter).map(Axis::name);
-    let letters: Vec<&str> = letters.collect();
-    let expected = "X, Y and Z, in this order, for this command";
-    Err(CliError::Arguments { found: format!("{name} with the axes {}", letters.join(", ")), expected })
+
+    /// The machine of X, Y and Z, in this order.
+    pub(super) fn xyz_machine(&self) -> Result<Machine, CliError> {
+        let machine = Machine::from_toml(&self.name, &self.text)?;
+        if machine.axes.each_ref().map(|axis| axis.letter) == [Axis::X, Axis::Y, Axis::Z].map(Some) {
+            return Ok(machine);
+        }
+        let letters = machine.axes.iter().filter_map(|axis| axis.letter).map(Axis::name);
+        let letters: Vec<&str> = letters.collect();
+        let expected = "X, Y and Z, in this order, for this command";
+        Err(CliError::Arguments {
+            found: format!("{} with the axes {}", self.name, letters.join(", ")),
+            expected,
+        })
+    }
 }
 
 fn machine_text(path: &Path) -> Result<(String, String), CliError> {

@@ -14,6 +14,7 @@
 //! - [`harmonic`]: amplitude and phase of the velocity;
 //! - [`identification`]: the runs that [`crate::identify`] asks for;
 //! - [`recorded`]: an axis from a recording or CSV, for identification without a simulation;
+//! - [`screw`]: where the load is, place by place, which no encoder on a motor sees;
 //! - [`inertia`]: harmonic motion under a growing load, until the current limit shows;
 //! - [`circle`](mod@circle): contour error, form deviation, following error;
 //! - [`compare`]: regulators side by side; [`peer_regulator`]: one that differences positions;
@@ -39,6 +40,8 @@ pub mod peer_regulator;
 pub mod recorded;
 pub mod reference;
 pub mod replay;
+mod rows;
+pub mod screw;
 
 pub mod spectrum;
 pub mod step;

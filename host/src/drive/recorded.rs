@@ -5,12 +5,19 @@
 
 use core::ops::Range;
 
+use super::rows;
 use crate::identify::AxisRecording;
 use crate::recording::{Recording, RecordingError, replay};
 use crate::simulate::RunError;
 
 /// The columns of CSV.
 const HEADING: [&str; 3] = ["time_s", "command_v", "counts"];
+/// What is expected of the file, its heading, and a row.
+const EXPECTED: [&str; 3] = [
+    "a recording of `motion run --record`, or CSV",
+    "the heading time_s,command_v,counts",
+    "three finite numbers: time [s], command [V], counts",
+];
 /// How far a time may be from its tick's, in ticks.
 const JITTER_TICKS: f64 = 0.1;
 /// Ticks at the start in which an axis that stands moves by no more than these counts.
@@ -105,46 +112,20 @@ fn of_csv(name: &str, bytes: &[u8], scales: Scales) -> Result<AxisRecording, Rec
         found,
         expected,
     };
-    let text = core::str::from_utf8(bytes).map_err(|error| {
-        let line = bytes[..error.valid_up_to()].iter().filter(|&&byte| byte == b'\n').count() + 1;
-        fail(line, "a byte that is not UTF-8".to_owned(), "a recording of `motion run --record`, or CSV")
-    })?;
-    let rows = text.trim_start_matches('\u{feff}').lines().enumerate();
-    let mut rows = rows
-        .map(|(index, row)| (index + 1, row.trim()))
-        .filter(|(_, row)| !row.is_empty() && !row.starts_with('#'));
-    let fields = |row: &str| row.split(',').map(|field| field.trim().to_owned()).collect::<Vec<_>>();
-    let (line, heading) = rows.next().unwrap_or((1, ""));
-    if fields(heading) != HEADING {
-        return Err(fail(line, format!("'{heading}'"), "the heading time_s,command_v,counts"));
-    }
-    let (mut times_s, mut command_mm_s, mut actual_mm) = (Vec::new(), Vec::new(), Vec::new());
-    let mut lines = Vec::new();
-    for (line, row) in rows {
-        let numbers: Vec<Option<f64>> = fields(row)
-            .iter()
-            .map(|field| field.parse().ok().filter(|number: &f64| number.is_finite()))
-            .collect();
-        let &[Some(time_s), Some(command_v), Some(counts)] = numbers.as_slice() else {
-            return Err(fail(
-                line,
-                format!("'{row}'"),
-                "three finite numbers: time [s], command [V], counts",
-            ));
-        };
-        times_s.push(time_s);
+    let rows = rows::read(name, bytes, HEADING, EXPECTED)?;
+    let &[(_, [first_s, ..]), .., (last_line, [last_s, ..])] = rows.as_slice() else {
+        return Err(fail(1, format!("{} rows", rows.len()), "a row for every tick"));
+    };
+    let (mut command_mm_s, mut actual_mm) = (Vec::new(), Vec::new());
+    for (_, [_, command_v, counts]) in &rows {
         command_mm_s.push(command_v / 10.0 * scales.mm_s_at_10_v);
         actual_mm.push(counts * scales.mm_per_count);
-        lines.push(line);
     }
-    let (&[first_s, .., last_s], &[.., last_line]) = (times_s.as_slice(), lines.as_slice()) else {
-        return Err(fail(line, format!("{} rows", lines.len()), "a row for every tick"));
-    };
-    let tick_s = (last_s - first_s) / (times_s.len() - 1) as f64;
+    let tick_s = (last_s - first_s) / (rows.len() - 1) as f64;
     if !TICK_S.contains(&tick_s) {
         return Err(fail(last_line, format!("ticks of {tick_s} s"), "ticks of 10 µs to 0.1 s"));
     }
-    for (index, (time_s, line)) in times_s.iter().zip(&lines).enumerate() {
+    for (index, (line, [time_s, ..])) in rows.iter().enumerate() {
         let expected_s = first_s + index as f64 * tick_s;
         if (time_s - expected_s).abs() > JITTER_TICKS * tick_s {
             let found = format!("the time {time_s} s where ticks of {tick_s} s are at {expected_s} s");
@@ -156,7 +137,7 @@ fn of_csv(name: &str, bytes: &[u8], scales: Scales) -> Result<AxisRecording, Rec
         start.iter().map(|at| (at - start[0]).abs()).fold(0.0, f64::max) / scales.mm_per_count.abs();
     if moved_counts > REST.1 {
         let found = format!("an axis that moves by {moved_counts:.0} counts in the first {} ticks", REST.0);
-        return Err(fail(lines[0], found, "a recording that begins at rest"));
+        return Err(fail(rows[0].0, found, "a recording that begins at rest"));
     }
     Ok(AxisRecording { tick_s, command_mm_s, actual_mm, lead_in_ticks: 0, harmonic_hz: None })
 }

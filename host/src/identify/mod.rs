@@ -64,6 +64,7 @@ mod confidence;
 mod fit;
 mod estimate;
 mod display;
+mod screw;
 
 pub use display::Described;
 pub use error::IdentifyError;
@@ -73,6 +74,9 @@ pub use estimate::{
 pub use excitation::{Excitation, Reach, explore, first_look, identification_plan};
 pub use harmonic_reading::{Bandwidth, HarmonicReading};
 pub use recording::AxisRecording;
+pub use screw::{
+    ExplainedReading, PitchErrorFound, ScrewError, ScrewFound, ScrewReading, ScrewReference, identify_screw,
+};
 pub use step_reading::StepReading;
 
 /// Identifies an axis.

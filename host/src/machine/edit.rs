@@ -1,6 +1,6 @@
 //! Values written into a machine file, whose comments and layout stay as they are.
 
-use motion_kernel::axis::{Feedforward, Gains};
+use motion_kernel::axis::{AxisCompensation, Feedforward, Gains};
 use serde::Deserialize;
 use toml_edit::{DocumentMut, Item, Table, value};
 
@@ -38,6 +38,50 @@ pub fn edited(source_name: &str, text: &str, edits: &[AxisEdit]) -> Result<Strin
         let regulator =
             axis.get_mut("regulator").and_then(Item::as_table_mut).ok_or_else(|| missing("regulator"))?;
         set_regulator(regulator, edit);
+    }
+    Ok(document.to_string())
+}
+
+/// `text`, a machine file, with the compensation of axis `axis` (from 0), or with no table where there is none.
+///
+/// # Errors
+/// The text is no machine file: not TOML, or without the axis.
+pub fn compensated(
+    source_name: &str,
+    text: &str,
+    axis: usize,
+    compensation: &AxisCompensation,
+) -> Result<String, MachineError> {
+    let mut document = document(source_name, text)?;
+    let axes = document.get_mut("axis").and_then(Item::as_array_of_tables_mut);
+    let Some(table) = axes.and_then(|axes| axes.get_mut(axis)) else {
+        let problem = format!("found no axis {}, expected [[axis]]", axis + 1);
+        return Err(MachineError::new(source_name, text, &(0..0), problem));
+    };
+    let AxisCompensation { backlash, pitch_error } = compensation;
+    let compensation = child(table, "compensation");
+    compensation.set_implicit(true);
+    match backlash {
+        None => drop(compensation.remove("backlash")),
+        Some(backlash) => {
+            let backlash_table = child(compensation, "backlash");
+            set(backlash_table, "play_mm", Some(backlash.play_mm));
+            set(backlash_table, "take_up_s", Some(backlash.take_up_s));
+        }
+    }
+    match pitch_error {
+        None => drop(compensation.remove("pitch_error")),
+        Some(error) => {
+            let table = child(compensation, "pitch_error");
+            set(table, "start_mm", Some(error.start_mm));
+            set(table, "spacing_mm", Some(error.spacing_mm));
+            let points_um = (0..error.point_count()).filter_map(|point| error.point_um(point));
+            table.insert("points_um", value(points_um.collect::<toml_edit::Array>()));
+            table.insert("repeats", value(error.repeats));
+        }
+    }
+    if compensation.is_empty() {
+        table.remove("compensation");
     }
     Ok(document.to_string())
 }
@@ -174,7 +218,7 @@ fn set(table: &mut Table, key: &str, to: Option<f64>) {
 
 #[cfg(test)]
 mod tests {
-    use motion_kernel::axis::{BedInverse, DriveInverse};
+    use motion_kernel::axis::{Backlash, BedInverse, DriveInverse, PitchError};
 
     use super::*;
     use crate::machine::{Machine, REFERENCE_TOML};
@@ -238,6 +282,31 @@ mod tests {
         machine.axes[0].feedforward.tables = tables;
         let with = edited("m.toml", &text, &[edit(&machine, 0)]).expect("a machine file");
         assert_eq!(read(&with), machine);
+    }
+
+    #[test]
+    fn a_compensation_is_written_and_taken_out() {
+        let mut machine = Machine::reference();
+        let pitch_error =
+            PitchError::new(-12.5, 0.625, &[0.0, 7.07, 10.0, 0.03, 0.0, -7.07, -10.0, -7.07], true);
+        let both =
+            AxisCompensation { backlash: Some(Backlash { play_mm: 0.0203, take_up_s: 0.0055 }), pitch_error };
+        let mut text = REFERENCE_TOML.to_owned();
+        for compensation in [
+            both,
+            AxisCompensation { backlash: None, ..both },
+            AxisCompensation { pitch_error: None, ..both },
+            AxisCompensation { backlash: None, pitch_error: None },
+        ] {
+            text = compensated("m.toml", &text, 1, &compensation).expect("a machine file");
+            machine.axes[1].compensation = (compensation
+                != AxisCompensation { backlash: None, pitch_error: None })
+            .then_some(compensation);
+            assert_eq!(Machine::from_toml("m.toml", &text), Ok(machine.clone()), "{text}");
+        }
+        assert_eq!(text, REFERENCE_TOML);
+        let error = compensated("m.toml", &text, 3, &both).expect_err("no such axis");
+        assert!(error.to_string().contains("found no axis 4"), "{error}");
     }
 
     #[test]

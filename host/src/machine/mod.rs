@@ -40,7 +40,7 @@ mod tests;
 
 pub use any::AnyMachine;
 pub(crate) use any::on_machine;
-pub use edit::{AxisEdit, NumberEdit, edited, numbers, with_numbers};
+pub use edit::{AxisEdit, NumberEdit, compensated, edited, numbers, with_numbers};
 pub use error::{AxisError, MachineError};
 pub(crate) use law_name::{LAW_NAMES, law_named};
 pub use settings::{

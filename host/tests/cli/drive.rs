@@ -32,6 +32,88 @@ fn drive_compares_regulators() {
 }
 
 #[test]
+fn drive_finds_a_screw() {
+    let workspace = Workspace::new("screw");
+    let words = said(
+        &workspace,
+        &["drive", "screw", "--axis", "Y", "--from-mm", "0", "--to-mm", "40", "--program", "y.ngc"],
+    );
+    assert!(words.contains("program written to y.ngc"), "{words}");
+    let program = workspace.read("y.ngc");
+    assert_eq!(program.lines().filter(|line| line.starts_with("G53 G1 Y")).count(), 1 + 2 * (2 * 64 + 2));
+    // It is a program that the machine can run.
+    said(&workspace, &["check", "y.ngc"]);
+
+    // The machine file's axis has no errors: there is nothing to write.
+    let nothing =
+        ["drive", "screw", "--from-mm", "0", "--to-mm", "20", "--places", "20", "--output", "n.toml"];
+    let words = said(&workspace, &nothing);
+    assert!(
+        words.contains("no machine file is written: there is nothing that could be compensated"),
+        "{words}"
+    );
+    assert!(!workspace.0.join("n.toml").exists());
+
+    // 30 µm of play, and an error of ±8 µm a turn, as an instrument shows them.
+    let mut rows = String::from("commanded_mm,measured_mm\n# by hand\n");
+    for round in 0..2 {
+        let places = || (0..40).map(|place| 2.0 * f64::from(place) + 0.31 * f64::from(place % 7));
+        let mut put = |mm: f64, play_mm: f64| {
+            let noise_mm = 2e-4 * (97.0 * mm + f64::from(round)).sin();
+            let error_mm = 0.008 * (core::f64::consts::TAU * mm / 5.0).sin() + play_mm + noise_mm;
+            rows += &format!("{mm},{:.4}\n", mm + error_mm);
+        };
+        put(-2.0, if round == 0 { 0.0 } else { 0.03 });
+        places().for_each(|mm| put(mm, 0.0));
+        put(82.0, 0.0);
+        places().rev().for_each(|mm| put(mm, 0.03));
+    }
+    workspace.put("x.csv", &rows);
+    let typed = rows.replacen("\n82,82.", "\n82,82.4", 1);
+    workspace.put("typed.csv", &typed);
+    let words = said(&workspace, &["drive", "screw", "--from", "typed.csv", "--pitch-mm", "5"]);
+    assert!(words.contains("note: the reading at 82.") && words.contains("is its row right?"), "{words}");
+    let from = ["drive", "screw", "--from", "x.csv", "--pitch-mm", "5"];
+    let written = [&from[..], &["--output", "m.toml", "--report", "x.html", "--json"]].concat();
+    let json = workspace.json(&written);
+    let keys = ["axis", "readings", "backlash_mm", "take_up_s", "pitch_error", "before_um", "left_rms_um"];
+    assert_has(&json, &[&keys[..], &["left_most_um", "output", "reason"]].concat());
+    assert!((number(&json["backlash_mm"]["value"]) - 0.03).abs() < 2e-4, "{json}");
+    let error = &json["pitch_error"];
+    assert_eq!((&error["repeats"], &json["reason"]), (&Value::Bool(true), &Value::Null));
+    assert!(number(&json["left_rms_um"]) < 0.3 && number(&json["before_um"]) > 20.0, "{json}");
+    let machine = Machine::from_toml("m.toml", &workspace.read("m.toml")).expect("a machine");
+    let compensation = machine.axes[0].compensation.expect("compensation");
+    assert_eq!(
+        compensation.backlash.map(|it| it.play_mm),
+        Some(number(&json["backlash_mm"]["value"])).map(|mm| (mm * 1e5).round() / 1e5)
+    );
+    assert!(compensation.pitch_error.is_some_and(|table| table.repeats));
+    // The page draws what was read.
+    let figures = workspace.figures("x.html");
+    let drawn = points(&figures[0], 0, "after motion in negative direction");
+    assert_eq!(
+        drawn.len() + points(&figures[0], 0, "after motion in positive direction").len(),
+        number(&json["readings"]) as usize
+    );
+
+    // A hurried user.
+    let refusal = workspace.refusal(&["drive", "screw"]);
+    assert!(
+        refusal.contains("found axis X without travel in the machine file, expected --from-mm and --to-mm"),
+        "{refusal}"
+    );
+    let refusal = workspace.refusal(&[&from[..4], &["--pitch-mm", "0"]].concat());
+    assert!(refusal.contains("found --pitch-mm 0, expected the travel of a turn"), "{refusal}");
+    workspace.put("wrong.csv", &rows.replace("\n0,", "\n0;"));
+    let refusal = workspace.refusal(&["drive", "screw", "--from", "wrong.csv"]);
+    assert!(refusal.contains("wrong.csv:4: found '0;"), "{refusal}");
+    let refusal = workspace.refusal(&["drive", "screw", "--from", "x.csv", "--output", "x.csv"]);
+    assert!(refusal.contains("x.csv"), "{refusal}");
+    assert_eq!(workspace.read("x.csv"), rows);
+}
+
+#[test]
 fn drive_prints_its_keys() {
     let workspace = Workspace::new("drive");
     let step = workspace.json(&["drive", "step", "--json", "--report", "step.html"]);

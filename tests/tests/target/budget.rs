@@ -6,7 +6,7 @@ use motion_tests::figures::{Table, hold};
 
 use crate::programs;
 use crate::search::{KINDS, TURN, of_the_worst};
-use crate::tools::{Board, LIVE_BOARDS, M0, M3, M3_SOFT, M4F, M7, RISC_V, Tools};
+use crate::tools::{Board, COMPENSATED, LIVE_BOARDS, M0, M3, M3_SOFT, M4F, M7, RISC_V, Tools};
 
 /// Growth that fails.
 pub(crate) const GROWTH: f64 = 0.02;
@@ -21,6 +21,8 @@ const DENSEST: u32 = 1720;
 const LIVE: u32 = 1560;
 /// The same with every drive inverted.
 const INVERTED: u32 = 1800;
+/// The same with every screw compensated.
+const COMPENSATION: u32 = 2400;
 /// Those of the densest program with every drive inverted.
 const DENSEST_INVERTED: u32 = 1980;
 
@@ -129,6 +131,12 @@ pub(crate) fn instructions_of_a_tick(tools: &Tools) -> Result<(), String> {
                 board.core
             ));
         }
+    }
+    let compensated = by_name(&tools.count(COMPENSATED, "live_budget", &programs::compensated())?);
+    let what = "3 axes, live control and guards, screws compensated";
+    let most = row(&mut table, COMPENSATED, what, &compensated["tick"])[3];
+    if most > COMPENSATION {
+        return Err(format!("{what}: {most} instructions, promised {COMPENSATION}"));
     }
     for board in [M4F, M3, RISC_V] {
         for kind in KINDS {

@@ -1,9 +1,13 @@
 //! What the boards execute: the stringer, generated programs, and a program full of worst ticks.
 
+use core::f64::consts::TAU;
+
 use motion_host::gcode;
 use motion_host::machine::Machine;
 use motion_host::planning::{Executable, Mode, Plan, plan_program};
-use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward, Table, Tables};
+use motion_kernel::axis::{
+    AxisCompensation, Backlash, BedInverse, DriveInverse, Feedforward, PitchError, Table, Tables,
+};
 use motion_kernel::law::{Law, PlannedRamp, Pulse, Ramp};
 use motion_kernel::num::Fixed;
 use motion_kernel::program::{Header, Item, write};
@@ -121,12 +125,23 @@ fn off_by_a_last_place() -> Executable {
 
 /// The stringer and facets for live control, on the reference machine and with every drive inverted.
 pub(crate) fn worst_live_ticks() -> [Vec<Vec<u8>>; 2] {
-    [Machine::reference(), inverting()].map(|machine| {
-        vec![
-            live_bytes(STRINGER, &machine, Mode::Spanning),
-            live_bytes(&facets_text(), &machine, Mode::PerBlock),
-        ]
-    })
+    [Machine::reference(), inverting()].map(|machine| worst_live_ticks_of(&machine))
+}
+
+fn worst_live_ticks_of(machine: &Machine) -> Vec<Vec<u8>> {
+    vec![live_bytes(STRINGER, machine, Mode::Spanning), live_bytes(&facets_text(), machine, Mode::PerBlock)]
+}
+
+/// Those on the reference machine with play and an error of every turn on every axis, which are compensated.
+pub(crate) fn compensated() -> Vec<Vec<u8>> {
+    let mut machine = Machine::reference();
+    let points_um: Vec<f64> = (0..32).map(|point| 10.0 * (f64::from(point) * TAU / 32.0).sin()).collect();
+    let compensation = AxisCompensation {
+        backlash: Some(Backlash { play_mm: 0.02, take_up_s: 0.006 }),
+        pitch_error: PitchError::new(0.0, 5.0 / 32.0, &points_um, true),
+    };
+    machine.axes.iter_mut().for_each(|axis| axis.compensation = Some(compensation));
+    worst_live_ticks_of(&machine)
 }
 
 /// Those and random programs.

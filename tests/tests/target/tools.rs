@@ -67,6 +67,9 @@ pub(crate) const WATCHED_BOARDS: [Board; 4] = all_with("watch");
 /// Those that run as a board on the link: the UART is that of the MPS2.
 pub(crate) const LINKED_BOARDS: [Board; 2] = [M4F.with("link"), M3.with("link")];
 
+/// The one whose axes are compensated.
+pub(crate) const COMPENSATED: Board = M4F.with("compensation");
+
 const fn all_with(features: &'static str) -> [Board; 4] {
     let [m4f, m7, m3, risc_v] = LARGE;
     [m4f.with(features), m7.with(features), m3.with(features), risc_v.with(features)]
@@ -105,9 +108,10 @@ const EMULATORS: [&str; 2] = ["qemu-system-arm", "qemu-system-riscv32"];
 pub(crate) const COUNTING: [&str; 2] = ["-icount", "shift=6,sleep=off"];
 
 /// The images that tests ask for, by features.
-const IMAGES: [(&str, &[&str]); 5] = [
+const IMAGES: [(&str, &[&str]); 6] = [
     ("", &["closed_loop", "interrupt", "budget", "functions", "kernel_only", "empty"]),
     ("live", &["live", "live_budget", "answers", "budget", "kernel_only", "empty"]),
+    ("compensation", &["live_budget"]),
     ("watch", &["live_interrupt"]),
     ("link", &["linked", "empty"]),
     ("soft-float", &["budget", "functions"]),
@@ -219,7 +223,7 @@ impl Tools {
     /// All images with `features`, for all targets, in a folder by target.
     fn build(&self, features: &'static str) -> Result<PathBuf, String> {
         let boards = BOARDS.into_iter().chain(LIVE_BOARDS).chain(WATCHED_BOARDS);
-        let boards = boards.chain(LINKED_BOARDS).chain([M3_SOFT]);
+        let boards = boards.chain(LINKED_BOARDS).chain([M3_SOFT, COMPENSATED]);
         let targets: BTreeSet<_> =
             boards.filter(|board| board.features == features).map(|board| board.target).collect();
         let images = IMAGES.iter().find(|(of, _)| *of == features).map_or(&[][..], |(_, images)| *images);

@@ -7,6 +7,7 @@
 //! - [`compare`]: regulators side by side;
 //! - [`bode`]: the step's spectrum, harmonics and the linear model side by side;
 //! - [`excitation`]: the program to record; [`identify`]: an axis from a recording;
+//! - [`screw`]: backlash and pitch error, from where the load was measured;
 //! - [`tune`]: identification, proposal, verification (`verification`).
 
 pub mod bode;
@@ -16,6 +17,7 @@ pub mod excitation;
 pub mod harmonic;
 pub mod identify;
 pub mod inertia;
+pub mod screw;
 pub mod step;
 pub mod tune;
 
@@ -53,6 +55,7 @@ Examples:
   motion drive bode --axis Y --json                  curves from step, harmonics and the linear model
   motion drive excitation --axis Y --output y.ngc    the program whose run shows the drive of Y
   motion drive identify --axis Y --from y.csv        Y's drive from a recording of it
+  motion drive screw --pitch-mm 5 --from x.csv       backlash and pitch error of X, as an instrument saw them
   motion drive tune --machine mine.toml --output mine.toml
                                                      identify the axes and set their regulators
 
@@ -78,6 +81,7 @@ enum Experiment {
     Bode(bode::BodeArguments),
     Excitation(excitation::ExcitationArguments),
     Identify(identify::IdentifyArguments),
+    Screw(screw::ScrewArguments),
     Tune(tune::TuneArguments),
 }
 
@@ -95,6 +99,7 @@ pub fn drive(arguments: &DriveArguments, out: &mut dyn Write) -> Result<Outcome,
         Experiment::Bode(arguments) => bode::run(arguments, out),
         Experiment::Excitation(arguments) => excitation::run(arguments, out),
         Experiment::Identify(arguments) => identify::run(arguments, out),
+        Experiment::Screw(arguments) => screw::run(arguments, out),
         Experiment::Tune(arguments) => tune::run(arguments, out),
     }
 }

@@ -1,7 +1,6 @@
 //! `motion drive tune`: identify the axes, propose regulator figures with their reasons, verify them on
 //! circles, and write them into the machine file.
 
-use std::fs;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -13,6 +12,7 @@ use super::axis_named;
 use super::identify::from_recording;
 use super::verification::{Verification, VerificationJson};
 use crate::cli::error::{CliError, Outcome};
+use crate::cli::input::MachineText;
 use crate::cli::outputs::{self, Written};
 use crate::cli::table::{self, Align};
 use crate::cli::write_json;
@@ -25,7 +25,7 @@ use crate::drive::reference::CIRCLE_FEED_MM_S;
 use crate::drive::verification::{bears_mm_s2, planes};
 use crate::files::Files;
 use crate::identify::{Estimate, Identification};
-use crate::machine::{AxisEdit, AxisSettings, Machine, REFERENCE_TOML, edited};
+use crate::machine::{AxisEdit, AxisSettings, Machine, edited};
 use crate::report::drive::{LearntRow, TunedAxis, Tuning, tune_findings};
 use crate::report::{Findings, Verdict};
 use crate::simulate::StretchCorrection;
@@ -148,8 +148,8 @@ pub fn run(arguments: &TuneArguments, out: &mut dyn Write) -> Result<Outcome, Cl
     };
     let learn_output = outputs::open(&mut files, "--learn-output", arguments.learn_output.as_ref())?;
     let report = outputs::open(&mut files, "--report", arguments.report.as_ref())?;
-    let source = Source::read(arguments.machine.as_ref())?;
-    let machine = Machine::from_toml(&source.name, &source.text)?;
+    let source = MachineText::read(arguments.machine.as_ref())?;
+    let machine = source.xyz_machine()?;
     let axes = match arguments.axis.as_slice() {
         [] => (0..machine.axes.len()).collect(),
         names => names.iter().map(|name| axis_named(&machine, name)).collect::<Result<Vec<_>, _>>()?,
@@ -278,7 +278,7 @@ impl Work {
     fn tune(
         &mut self,
         machine: &Machine,
-        source: &Source,
+        source: &MachineText,
         axes: &[usize],
         arguments: &TuneArguments,
         learning: Option<&Lesson>,
@@ -358,25 +358,6 @@ fn identified(
             Ok(vec![from_recording(machine, axis, path, Scales { mm_s_at_10_v, mm_per_count })?])
         }
         _ => Ok(identify_axes(machine, axes)?),
-    }
-}
-
-/// The text of the machine file, or that of the reference machine.
-struct Source {
-    name: String,
-    text: String,
-}
-
-impl Source {
-    fn read(path: Option<&PathBuf>) -> Result<Self, CliError> {
-        let Some(path) = path else {
-            return Ok(Self { name: "reference.toml".to_owned(), text: REFERENCE_TOML.to_owned() });
-        };
-        let name = path.display().to_string();
-        match fs::read_to_string(path) {
-            Ok(text) => Ok(Self { name, text }),
-            Err(source) => Err(CliError::Read { path: name, source }),
-        }
     }
 }
 

@@ -9,6 +9,7 @@ mod bode;
 mod circle;
 mod harmonic;
 mod inertia;
+mod screw;
 mod step;
 mod tune;
 
@@ -20,6 +21,7 @@ pub use self::circle::{
 pub use self::compare::{Outputs, compare_findings, picture_of_errors, picture_of_outputs};
 pub use self::harmonic::{harmonic_figures, harmonic_findings};
 pub use self::inertia::{inertia_figure, inertia_findings};
+pub use self::screw::screw_findings;
 pub use self::step::{step_figures, step_findings};
 pub use self::tune::{Circles, LearntRow, NotDriven, TunedAxis, Tuning, tune_figures, tune_findings};
 
