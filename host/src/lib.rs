@@ -34,6 +34,7 @@
 // What only the command uses is in modules that others use, too.
 #![cfg_attr(not(feature = "terminal"), allow(dead_code, unused_imports))]
 
+mod chance;
 #[cfg(feature = "terminal")]
 pub mod files;
 pub mod machine;

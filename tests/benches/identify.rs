@@ -11,6 +11,9 @@ use std::time::{Duration, Instant};
 use motion_host::drive::verification::VERIFIED_HZ;
 use motion_tests::drives::{report, surveyed};
 
+/// Drives that may be refused.
+const REFUSED_ONE_IN: usize = 20;
+
 struct Arguments {
     seeds: [u64; 2],
     threads: u64,
@@ -69,6 +72,11 @@ fn main() -> ExitCode {
     });
     all.sort_by_key(|one| one.axis.seed);
     print!("{}", report(&all));
+    let refused = all.iter().filter(|one| one.found.is_err()).count();
+    if all.len() < REFUSED_ONE_IN * refused || all.is_empty() {
+        eprintln!("{refused} of {} drives refused, expected less than one in {REFUSED_ONE_IN}", all.len());
+        return ExitCode::FAILURE;
+    }
     let wrong = all.iter().filter(|one| !one.wrong().is_empty()).count();
     if wrong > 0 {
         eprintln!("{wrong} of {} drives: something is wrong", all.len());

@@ -9,6 +9,7 @@ use super::AXES;
 use super::experiment::{DriveError, within};
 use super::recorded::RecordedError;
 use super::rows;
+use crate::chance::Chance;
 use crate::gcode;
 use crate::identify::ScrewReading;
 use crate::machine::Machine;
@@ -26,11 +27,9 @@ const EXPECTED: [&str; 3] = [
 ];
 /// Turning points lie this far beyond the places, so that each is approached through the play \[mm\].
 const BEYOND_MM: f64 = 1.5;
-/// The part of the distance between two places that they are shifted by, all differently: no error that repeats hides
-/// between equal distances (as ISO 230-2 asks).
-const SHIFT: f64 = 0.5;
-/// Multiples of it are spread over 0 … 1 as evenly as can be.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
+/// Places are anywhere within equal parts of the travel, as ISO 230-2 asks: then no error that repeats hides between them. They
+/// are the same every time.
+const PLACES_SEED: u64 = 230;
 /// An overshoot would take up the play: slowly \[mm/s\].
 const FEED_MM_S: f64 = 10.0;
 /// How long an axis stands until it is at rest, in simulation \[s\].
@@ -41,7 +40,7 @@ const REST_S: f64 = 0.3;
 pub struct Survey {
     /// The axis, from 0.
     pub axis: usize,
-    /// The ends, in machine coordinates \[mm\]; the places lie [1.5 mm](BEYOND_MM) within.
+    /// The ends, in machine coordinates \[mm\]; the places lie 1.5 mm within.
     pub ends_mm: [f64; 2],
     /// How many places.
     pub places: u32,
@@ -70,13 +69,14 @@ impl Survey {
     pub fn stops_mm(&self) -> Vec<f64> {
         let [low_mm, high_mm] = self.ends_mm;
         let (first_mm, last_mm) = (low_mm + BEYOND_MM, high_mm - BEYOND_MM);
-        let spacing_mm = (last_mm - first_mm) / (f64::from(self.places - 1) + SHIFT);
-        let at = |place: u32| {
-            let shift = SHIFT * (GOLDEN * f64::from(place)).fract();
+        let part_mm = (last_mm - first_mm) / f64::from(self.places);
+        let mut chance = Chance(PLACES_SEED);
+        let mut places_mm: Vec<f64> = (0..self.places)
             // As programs say it.
-            ((first_mm + spacing_mm * (f64::from(place) + shift)) * 1e4).round() / 1e4
-        };
-        let up = || (0..self.places).map(at);
+            .map(|part| ((first_mm + part_mm * (f64::from(part) + chance.unit())) * 1e4).round() / 1e4)
+            .collect();
+        places_mm.dedup();
+        let up = || places_mm.iter().copied();
         let round = || up().chain([high_mm]).chain(up().rev()).chain([low_mm]);
         core::iter::once(low_mm).chain((0..self.rounds).flat_map(|_| round())).collect()
     }
@@ -89,7 +89,7 @@ pub fn program(machine: &Machine, survey: &Survey) -> String {
     let letter = ["X", "Y", "Z"][survey.axis.min(AXES - 1)];
     let feed_mm_min = 60.0 * FEED_MM_S.min(settings.feed_mm_s).min(machine.path.feed_mm_s);
     let mut text = format!(
-        "(screw of axis {}: measure where the load is at every rest, the first one included)\nG21 G90 G94 G61\n",
+        "(screw of axis {}: without compensation; measure where the load is at every rest, the first one included)\nG21 G90 G94 G61\n",
         settings.name
     );
     for stop_mm in survey.stops_mm() {
@@ -141,21 +141,24 @@ pub fn measure(machine: &Machine, survey: &Survey) -> Result<Vec<ScrewReading>, 
 /// The text is no such CSV.
 pub fn read(name: &str, bytes: &[u8]) -> Result<Vec<ScrewReading>, RecordedError> {
     let rows = rows::read(name, bytes, HEADING, EXPECTED)?;
+    if let Some([_, (line, [commanded_mm, _])]) = rows.windows(2).find(|pair| pair[0].1[0] == pair[1].1[0]) {
+        return Err(RecordedError::Line {
+            name: name.to_owned(),
+            line: *line,
+            found: format!("{commanded_mm} mm, as in the row before"),
+            expected: "a row for each rest, turning points too: they say from which side a place was come to",
+        });
+    }
     Ok(directed(&rows.into_iter().map(|(_, row)| row).collect::<Vec<_>>()))
 }
 
-/// Readings in the order of the motion: each has the direction in which it was come to, but those before the first motion.
+/// Readings in the order of the motion, each with the direction in which its place was reached; the first has none.
 fn directed(readings: &[[f64; 2]]) -> Vec<ScrewReading> {
     let mut before: Option<f64> = None;
-    let mut is_from_above = None;
     readings
         .iter()
         .map(|&[commanded_mm, measured_mm]| {
-            if let Some(before_mm) = before
-                && before_mm != commanded_mm
-            {
-                is_from_above = Some(commanded_mm < before_mm);
-            }
+            let is_from_above = before.map(|before_mm| commanded_mm < before_mm);
             before = Some(commanded_mm);
             ScrewReading { commanded_mm, measured_mm, is_from_above }
         })

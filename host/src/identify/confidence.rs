@@ -20,6 +20,7 @@ use super::cholesky::{Lower, Symmetric};
 use super::parameters::{Unknown, Unknowns};
 use super::readings::{Precision, Residuals, Runs, Weights, dot};
 use super::search::{Found, derivatives};
+use crate::chance::Chance;
 
 /// Lags over which autocorrelation is summed at most.
 const LAGS_MAX: usize = 400;
@@ -261,25 +262,6 @@ impl Confidence {
         let mut off: Vec<f64> = self.samples.iter().map(|sample| (of(sample) - value).abs()).collect();
         off.sort_by(f64::total_cmp);
         Estimate { value, half_width_95: self.widening * off[off.len() * 95 / 100] }
-    }
-}
-
-/// Random numbers that are the same every time: SplitMix64.
-struct Chance(u64);
-
-impl Chance {
-    fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut bits = self.0;
-        bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((bits ^ (bits >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// By Box and Muller, one of the two.
-    fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
-        radius * (core::f64::consts::TAU * self.unit()).cos()
     }
 }
 

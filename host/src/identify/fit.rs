@@ -451,15 +451,18 @@ fn estimates(confidence: &Confidence, found: &Found, tick_s: f64) -> AxisParamet
     let delay_s = |unknowns: &Unknowns| {
         unknowns.dead_time_s() + unknowns.filter_s() + unknowns.current_lag_s() + 0.5 * tick_s
     };
+    let unresolved_s = found.unknowns.unresolved_filter_s();
+    let or_none =
+        |estimate: Estimate| Estimate { half_width_95: estimate.half_width_95 + unresolved_s, ..estimate };
     AxisParametersFound {
         command_gain: of(Unknown::Gain),
         command_offset_mm_s: of(Unknown::Offset),
         velocity_gain_per_s: of(Unknown::VelocityGain),
         integral_time_s: of(Unknown::IntegralTime),
         dead_time_s: confidence.estimate(Unknowns::dead_time_s),
-        command_filter_s: confidence.estimate(Unknowns::filter_s),
+        command_filter_s: or_none(confidence.estimate(Unknowns::filter_s)),
         current_lag_s: confidence.estimate(Unknowns::current_lag_s),
-        total_delay_s: confidence.estimate(delay_s),
+        total_delay_s: or_none(confidence.estimate(delay_s)),
         accel_limit_mm_s2: of(Unknown::AccelLimit),
         coulomb_friction_mm_s2: of(Unknown::Coulomb),
         viscous_friction_per_s: of(Unknown::Viscous),

@@ -75,7 +75,8 @@ pub use excitation::{Excitation, Reach, explore, first_look, identification_plan
 pub use harmonic_reading::{Bandwidth, HarmonicReading};
 pub use recording::AxisRecording;
 pub use screw::{
-    ExplainedReading, PitchErrorFound, ScrewError, ScrewFound, ScrewReading, ScrewReference, identify_screw,
+    ExplainedReading, PitchErrorFound, ScrewError, ScrewFound, ScrewReading, ScrewReference, ScrewSearch,
+    identify_screw,
 };
 pub use step_reading::StepReading;
 

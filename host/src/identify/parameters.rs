@@ -307,6 +307,13 @@ impl Unknowns {
         self.time_constant_s(self.filter_delay_s())
     }
 
+    /// By how much its time constant tells more than the filter delays \[s\], if it is no longer than two sub-steps; else 0. There
+    /// is half a sub-step in every lag's time constant, but none where there is no lag, and a filter as short as this may be none.
+    pub(super) fn unresolved_filter_s(&self) -> f64 {
+        let filter_s = self.filter_s();
+        if filter_s <= 2.0 * self.step_s { filter_s - self.filter_delay_s() } else { 0.0 }
+    }
+
     /// Tc \[s\].
     pub(super) fn current_lag_s(&self) -> f64 {
         self.time_constant_s(self.get(CurrentLag))

@@ -59,8 +59,11 @@ pub fn compensated(
         return Err(MachineError::new(source_name, text, &(0..0), problem));
     };
     let AxisCompensation { backlash, pitch_error } = compensation;
+    let is_new = !table.contains_table("compensation");
     let compensation = child(table, "compensation");
-    compensation.set_implicit(true);
+    if is_new {
+        compensation.set_implicit(true);
+    }
     match backlash {
         None => drop(compensation.remove("backlash")),
         Some(backlash) => {
@@ -76,8 +79,8 @@ pub fn compensated(
             set(table, "start_mm", Some(error.start_mm));
             set(table, "spacing_mm", Some(error.spacing_mm));
             let points_um = (0..error.point_count()).filter_map(|point| error.point_um(point));
-            table.insert("points_um", value(points_um.collect::<toml_edit::Array>()));
-            table.insert("repeats", value(error.repeats));
+            put(table, "points_um", points_um.collect::<toml_edit::Array>());
+            put(table, "repeats", error.repeats);
         }
     }
     if compensation.is_empty() {
@@ -199,20 +202,23 @@ fn child<'table>(parent: &'table mut Table, name: &str) -> &'table mut Table {
     item.as_table_mut().expect("made a table")
 }
 
-/// Sets `key`, keeping what is written around its value, or takes it out.
+/// Sets `key`, or takes it out.
 fn set(table: &mut Table, key: &str, to: Option<f64>) {
-    match (to, table.get_mut(key).and_then(Item::as_value_mut)) {
-        (None, _) => {
-            table.remove(key);
-        }
-        (Some(to), Some(old)) => {
+    match to {
+        Some(to) => put(table, key, to),
+        None => drop(table.remove(key)),
+    }
+}
+
+/// Sets `key`, keeping what is written around its value.
+fn put(table: &mut Table, key: &str, to: impl Into<toml_edit::Value>) {
+    match table.get_mut(key).and_then(Item::as_value_mut) {
+        Some(old) => {
             let decor = old.decor().clone();
-            *old = toml_edit::Value::from(to);
+            *old = to.into();
             *old.decor_mut() = decor;
         }
-        (Some(to), None) => {
-            table.insert(key, value(to));
-        }
+        None => drop(table.insert(key, value(to))),
     }
 }
 
@@ -305,6 +311,15 @@ mod tests {
             assert_eq!(Machine::from_toml("m.toml", &text), Ok(machine.clone()), "{text}");
         }
         assert_eq!(text, REFERENCE_TOML);
+        // What a user has written around the values stays.
+        let own = "# of the screw\n[axis.compensation]\n[axis.compensation.pitch_error]\nstart_mm = 0.0\nspacing_mm = 5.0\n\
+                   points_um = [0, 1] # by laser\n\n[axis.drive]";
+        let text = REFERENCE_TOML.replacen("[axis.drive]", own, 1);
+        let text = compensated("m.toml", &text, 0, &both).expect("a machine file");
+        assert!(
+            text.contains("# of the screw\n[axis.compensation]\n") && text.contains("] # by laser\n"),
+            "{text}"
+        );
         let error = compensated("m.toml", &text, 3, &both).expect_err("no such axis");
         assert!(error.to_string().contains("found no axis 4"), "{error}");
     }

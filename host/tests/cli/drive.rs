@@ -76,8 +76,9 @@ fn drive_finds_a_screw() {
     let from = ["drive", "screw", "--from", "x.csv", "--pitch-mm", "5"];
     let written = [&from[..], &["--output", "m.toml", "--report", "x.html", "--json"]].concat();
     let json = workspace.json(&written);
-    let keys = ["axis", "readings", "backlash_mm", "take_up_s", "pitch_error", "before_um", "left_rms_um"];
-    assert_has(&json, &[&keys[..], &["left_most_um", "output", "reason"]].concat());
+    let keys =
+        ["axis", "source", "readings", "backlash_mm", "take_up_s", "pitch_error", "before_um", "left_rms_um"];
+    assert_has(&json, &[&keys[..], &["left_most_um", "outlier", "output", "reason"]].concat());
     assert!((number(&json["backlash_mm"]["value"]) - 0.03).abs() < 2e-4, "{json}");
     let error = &json["pitch_error"];
     assert_eq!((&error["repeats"], &json["reason"]), (&Value::Bool(true), &Value::Null));
@@ -97,7 +98,35 @@ fn drive_finds_a_screw() {
         number(&json["readings"]) as usize
     );
 
+    // More than the axis can follow: told, drawn in red, not written.
+    workspace.put(
+        "steep.toml",
+        &workspace.stdout(&["machine"]).replace("accel_limit_mm_s2 = 12300.0", "accel_limit_mm_s2 = 501.0"),
+    );
+    let steep = [&from[..], &["--machine", "steep.toml", "--output", "steep.toml", "--report", "steep.html"]]
+        .concat();
+    let before = workspace.read("steep.toml");
+    let (words, _) = workspace.ending(1, &steep);
+    assert!(words.contains("no machine file is written: what was found can't be compensated"), "{words}");
+    assert!(
+        workspace.read("steep.html").contains("class=\"result faulted\"")
+            && workspace.read("steep.toml") == before
+    );
+    // Measured again, and found straight: what the file had goes.
+    let straight =
+        ["drive", "screw", "--machine", "m.toml", "--output", "m.toml", "--from-mm", "0", "--to-mm", "20"];
+    let words = said(&workspace, &[&straight[..], &["--places", "20"]].concat());
+    assert!(
+        words.contains("simulated machine") && words.contains("machine file written to m.toml"),
+        "{words}"
+    );
+    let machine = Machine::from_toml("m.toml", &workspace.read("m.toml")).expect("a machine");
+    assert_eq!(machine.axes[0].compensation, None);
+
     // A hurried user.
+    workspace.put("twice.csv", &rows.replacen("\n82,", "\n79.24,", 1));
+    let refusal = workspace.refusal(&["drive", "screw", "--from", "twice.csv"]);
+    assert!(refusal.contains("mm, as in the row before, expected a row for each rest"), "{refusal}");
     let refusal = workspace.refusal(&["drive", "screw"]);
     assert!(
         refusal.contains("found axis X without travel in the machine file, expected --from-mm and --to-mm"),

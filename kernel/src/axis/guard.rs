@@ -269,7 +269,7 @@ impl<R: Real> Guard<R> {
         self.take_up_samples = config.guard.response_samples.saturating_add(1);
     }
 
-    /// Whether the axis has moved as it does with its load ever since the last sample but one.
+    /// Whether the motor has moved its load ever since the last sample but one: what the samples are judged by.
     fn moves_load(&self) -> bool {
         #[cfg(feature = "compensation")]
         return self.take_up_samples == 0;
@@ -416,7 +416,7 @@ impl<R: Real> Guard<R> {
     fn runs_away(&self, config: &AxisConfig<R>, now_mm: R, by_load_mm: R) -> bool {
         let [latest, before, first] = self.counts;
         // Counts that stand still are another fault.
-        if !self.last.is_taken || !self.moves_load() || latest == before && before == first {
+        if !self.last.is_taken || latest == before && before == first {
             return false;
         }
         let guard = &config.guard;
@@ -469,7 +469,7 @@ impl<R: Real> Guard<R> {
         let goes_on = self.last.is_taken && commanded != 0 && commanded == self.last.commanded;
         let count = |samples: u16, again: bool| if again { samples.saturating_add(1) } else { 0 };
         let is_still = self.is_still(config);
-        let runs_away = self.runs_away(config, moved_mm, guard.load_sample_mm);
+        let runs_away = self.moves_load() && self.runs_away(config, moved_mm, guard.load_sample_mm);
         self.still_samples = count(self.still_samples, goes_on && is_still);
         self.against_samples = count(self.against_samples, goes_on && is_against);
         self.saturated_samples = count(self.saturated_samples, output.saturated);

@@ -15,9 +15,12 @@ use crate::cli::outputs::{self, Written};
 use crate::cli::write_json;
 use crate::drive::screw::{Survey, measure, program, read};
 use crate::files::Files;
-use crate::identify::{ScrewFound, ScrewReference, identify_screw};
+use crate::identify::{ScrewFound, ScrewReference, ScrewSearch, identify_screw};
 use crate::machine::{AxisSettings, Machine, compensated};
 use crate::report;
+
+/// Rest at a place \[s\], for the instrument.
+const REST_S: f64 = 3.0;
 
 const HELP: &str = "\
 An encoder on the motor sees neither play nor the screw's error: an instrument at the load does. --program writes the program
@@ -27,15 +30,20 @@ rest, in the order of the motion. The first row says where it began, and has no 
 axis of the machine file is measured.
 
 Which table is written, one over the travel or, with --pitch-mm, one that repeats turn by turn, and with how many points, is
-decided by what explains the readings better than chance; the axis has one of the two. Backlash that the readings do not tell
-from none, or that is less than the encoder's count, is not written.
+decided by what explains the readings better than chance; the axis has one of the two. What is less than a count of the encoder
+is not written, nor backlash whose interval has 0. Compensation that the machine file has of the axis is replaced.
 
 Examples:
   motion drive screw --axis X --from-mm 0 --to-mm 400 --program screw_x.ngc
   motion drive screw --axis X --pitch-mm 5 --from x.csv --machine mine.toml --output mine.toml
 
-JSON: axis, readings, backlash_mm {value, half_width_95}, take_up_s (null without backlash), pitch_error (null or {start_mm,
-spacing_mm, repeats, points_um, half_width_95_um}), before_um, left_rms_um, left_most_um, output, reason.";
+JSON: axis, source, readings, backlash_mm {value, half_width_95}, take_up_s (null without backlash), pitch_error (null or {start_mm,
+spacing_mm, repeats, points_um, half_width_95_um}), before_um, left_rms_um, left_most_um, outlier
+(null or {load_mm, off_um}), output, reason.";
+
+/// What a user should know of an axis that is compensated already.
+const OF_COMPENSATED: &str =
+    "the machine file compensates this axis: what is measured has to be measured without that";
 
 /// Find backlash and pitch error of an axis, and how to compensate them.
 #[derive(Debug, Args)]
@@ -65,9 +73,9 @@ pub struct ScrewArguments {
     /// How often each is gone to from both sides.
     #[arg(long, value_name = "NUMBER", default_value_t = 2)]
     rounds: u32,
-    /// Rest at each, in seconds, for the instrument.
-    #[arg(long, value_name = "S", default_value_t = 3.0, allow_negative_numbers = true)]
-    rest_s: f64,
+    /// Rest at each, in seconds, for the instrument; without it, 3.
+    #[arg(long, value_name = "S", requires = "program", allow_negative_numbers = true)]
+    rest_s: Option<f64>,
     /// Machine file (`motion machine` prints one); without it, the reference machine.
     #[arg(long, value_name = "FILE")]
     machine: Option<PathBuf>,
@@ -85,6 +93,7 @@ pub struct ScrewArguments {
 #[derive(Serialize)]
 struct ScrewJson<'run> {
     axis: &'run str,
+    source: &'run str,
     readings: usize,
     backlash_mm: PlayJson,
     take_up_s: Option<f64>,
@@ -92,8 +101,15 @@ struct ScrewJson<'run> {
     before_um: f64,
     left_rms_um: f64,
     left_most_um: f64,
+    outlier: Option<OutlierJson>,
     output: Option<&'run str>,
     reason: Option<String>,
+}
+
+#[derive(Serialize)]
+struct OutlierJson {
+    load_mm: f64,
+    off_um: f64,
 }
 
 #[derive(Serialize)]
@@ -138,6 +154,9 @@ pub fn run(arguments: &ScrewArguments, out: &mut dyn Write) -> Result<Outcome, C
         let mut written = Written::default();
         written.write("program", Some(file), |file| file.write_all(program.as_bytes()));
         written.say(out)?;
+        if machine.axes[axis].compensation.is_some() {
+            writeln!(out, "  note: {OF_COMPENSATED}").map_err(CliError::Output)?;
+        }
         return written.outcome(Outcome::Done);
     }
     let (measured, readings) = match &arguments.from {
@@ -153,13 +172,23 @@ pub fn run(arguments: &ScrewArguments, out: &mut dyn Write) -> Result<Outcome, C
         position_mm: homing.config.position.to_mm(),
         is_from_above: homing.config.direction == Direction::Negative,
     });
-    let found = identify_screw(&readings, arguments.pitch_mm, reference)
-        .map_err(|source| CliError::Screw { name: measured, source })?;
+    // What the drive has beyond the axis' own acceleration.
+    let left_mm_s2 = settings.drive_accel_mm_s2() - settings.accel_mm_s2;
+    let search = ScrewSearch {
+        pitch_mm: arguments.pitch_mm,
+        reference,
+        least_mm: settings.mm_per_count.abs(),
+        curvature_per_mm: left_mm_s2 / (settings.feed_mm_s * settings.feed_mm_s),
+    };
+    let found = identify_screw(&readings, &search)
+        .map_err(|source| CliError::Screw { name: measured.clone(), source })?;
     let compensation = compensation(&found, settings, machine.tick_s);
     let text = compensated(&source.name, &source.text, axis, &compensation)?;
     let refused = Machine::<3>::from_toml(&source.name, &text).err();
-    let is_any = compensation.backlash.is_some() || compensation.pitch_error.is_some();
-    let reason = match (&refused, is_any) {
+    let is_new = compensation.backlash.is_some()
+        || compensation.pitch_error.is_some()
+        || settings.compensation.is_some();
+    let reason = match (&refused, is_new) {
         (Some(refusal), _) => Some(format!("what was found can't be compensated: {refusal}")),
         (None, false) => Some("there is nothing that could be compensated".to_owned()),
         (None, true) if output.is_none() => Some("--output was not given".to_owned()),
@@ -170,11 +199,12 @@ pub fn run(arguments: &ScrewArguments, out: &mut dyn Write) -> Result<Outcome, C
     written.write("machine file", output, |file| file.write_all(text.as_bytes()));
     let name = &settings.name;
     written.write("report", report, |file| {
-        report::drive::screw_findings(&machine, axis, &found, &compensation).write(file)
+        report::drive::screw_findings(&machine, axis, &found, refused.is_some()).write(file)
     });
     if arguments.json {
         let json = ScrewJson {
             axis: name,
+            source: &measured,
             readings: found.readings.len(),
             backlash_mm: PlayJson {
                 value: found.backlash_mm.value,
@@ -191,14 +221,21 @@ pub fn run(arguments: &ScrewArguments, out: &mut dyn Write) -> Result<Outcome, C
             before_um: found.before_mm() * 1e3,
             left_rms_um: found.left_rms_mm * 1e3,
             left_most_um: found.left_most_mm * 1e3,
+            outlier: found.outlier().map(|reading| OutlierJson {
+                load_mm: reading.load_mm,
+                off_um: (reading.error_mm - reading.model_mm).abs() * 1e3,
+            }),
             output: written.place_of("machine file"),
             reason: reason.or_else(|| written.failure_of("machine file")),
         };
         write_json(&json, out)?;
     } else {
-        writeln!(out, "Screw of axis {name}, from {} readings at rest\n", found.readings.len())
+        writeln!(out, "Screw of axis {name}, from {} readings: {measured}\n", found.readings.len())
             .and_then(|()| write_words(&found, &compensation, out))
             .map_err(CliError::Output)?;
+        if settings.compensation.is_some() && arguments.from.is_some() {
+            writeln!(out, "  note: {OF_COMPENSATED}").map_err(CliError::Output)?;
+        }
         if let Some(reason) = &reason {
             writeln!(out, "  no machine file is written: {reason}").map_err(CliError::Output)?;
         }
@@ -218,7 +255,8 @@ fn survey(arguments: &ScrewArguments, machine: &Machine, axis: usize) -> Result<
         })
     };
     let ends_mm = [end_mm(arguments.from_mm, 0)?, end_mm(arguments.to_mm, 1)?];
-    let &ScrewArguments { places, rounds, rest_s, .. } = arguments;
+    let &ScrewArguments { places, rounds, .. } = arguments;
+    let rest_s = arguments.rest_s.unwrap_or(REST_S);
     let survey = Survey { axis, ends_mm, places, rounds, rest_s };
     survey.check()?;
     Ok(survey)
@@ -227,16 +265,15 @@ fn survey(arguments: &ScrewArguments, machine: &Machine, axis: usize) -> Result<
 /// What the machine file gets: what the readings determine and the encoder can tell.
 fn compensation(found: &ScrewFound, settings: &AxisSettings, tick_s: f64) -> AxisCompensation {
     let (play_mm, count_mm) = (found.backlash_mm, settings.mm_per_count.abs());
-    let backlash = (play_mm.value >= count_mm && play_mm.is_determined()).then(|| {
+    let is_play = play_mm.value >= count_mm && play_mm.value > play_mm.half_width_95;
+    let backlash = is_play.then(|| {
         // Ten nanometres are more than an instrument tells.
         let play_mm = (play_mm.value * 1e5).round().max(1.0) / 1e5;
         let ticks = (settings.take_up_s(play_mm) / tick_s).ceil().max(2.0);
         // To digits that a person can read, and not less.
         Backlash { play_mm, take_up_s: (ticks * tick_s * 1e6 - 1e-6).ceil() / 1e6 }
     });
-    let table = found.pitch_error.map(|error| error.table);
-    let pitch_error = table.filter(|table| points_um(table).iter().any(|um| um.abs() >= count_mm * 1e3));
-    AxisCompensation { backlash, pitch_error }
+    AxisCompensation { backlash, pitch_error: found.pitch_error.map(|error| error.table) }
 }
 
 fn points_um(table: &motion_kernel::axis::PitchError) -> Vec<f64> {
@@ -249,7 +286,8 @@ fn write_words(found: &ScrewFound, compensation: &AxisCompensation, out: &mut dy
     write!(out, "  backlash         {play_um:.2} ± {half_um:.2} µm")?;
     match compensation.backlash {
         Some(backlash) => writeln!(out, ", taken up in {:.3} ms", backlash.take_up_s * 1e3)?,
-        None => writeln!(out, ": less than a count, or not told from none")?,
+        None if play.value <= play.half_width_95 => writeln!(out, ": not told from none")?,
+        None => writeln!(out, ": less than a count, which is not compensated")?,
     }
     match &found.pitch_error {
         None => writeln!(out, "  pitch error      none that a table would explain better than chance")?,
@@ -275,7 +313,7 @@ fn write_words(found: &ScrewFound, compensation: &AxisCompensation, out: &mut dy
         let off_um = (reading.error_mm - reading.model_mm).abs() * 1e3;
         writeln!(
             out,
-            "  note: the reading at {:.3} mm is {off_um:.2} µm off, over five times the scatter: is its row right?",
+            "  note: the reading at {:.3} mm is {off_um:.2} µm off, more than scatter: is its row right?",
             reading.load_mm
         )?;
     }

@@ -1,7 +1,5 @@
 //! The page of a screw: what was measured from both sides, and what compensation makes of it.
 
-use motion_kernel::axis::AxisCompensation;
-
 use super::super::figure::{Axis, Graph, Series, Stack, ends_of};
 use super::super::findings::{Findings, Verdict};
 use super::super::format::figure;
@@ -11,23 +9,23 @@ use crate::machine::Machine;
 
 const UM: f64 = 1e3;
 
-/// Errors over the travel, before and after.
+/// Errors over the travel, and what the model leaves; `is_refused`: the machine file can't have it.
 #[must_use]
-pub fn screw_findings(
-    machine: &Machine,
-    axis: usize,
-    found: &ScrewFound,
-    compensation: &AxisCompensation,
-) -> Findings {
+pub fn screw_findings(machine: &Machine, axis: usize, found: &ScrewFound, is_refused: bool) -> Findings {
     let name = &machine.axes[axis].name;
     let title = format!("Screw of axis {name}");
     let um = |mm: f64| format!("{} µm", figure(mm * UM, 3));
-    let bold =
-        format!("Off the mean by at most {}; compensated {}.", um(found.before_mm()), um(found.left_most_mm));
+    let bold = format!(
+        "Off the mean by at most {}; by the model {}.",
+        um(found.before_mm()),
+        um(found.left_most_mm)
+    );
     let play = found.backlash_mm;
-    let is_any = compensation.backlash.is_some() || compensation.pitch_error.is_some();
-    let rest = if is_any { "" } else { "There is nothing that could be compensated." };
-    let verdict = if is_any { Verdict::Done } else { Verdict::Unfinished };
+    let (verdict, rest) = if is_refused {
+        (Verdict::Failed, "The machine file can’t have this compensation.")
+    } else {
+        (Verdict::Done, "")
+    };
     let mut findings = Findings::new(&title, &machine.name, verdict, [&bold, rest]);
     findings.section("Where the load is, less where it was told to be");
     let of = |is_from_above: bool, value: &dyn Fn(&ExplainedReading) -> f64| {
