@@ -16,7 +16,7 @@ pub fn screw_findings(machine: &Machine, axis: usize, found: &ScrewFound, is_ref
     let title = format!("Screw of axis {name}");
     let um = |mm: f64| format!("{} µm", figure(mm * UM, 3));
     let bold = format!(
-        "Off the mean by at most {}; by the model {}.",
+        "Off the mean by at most {}; off the model by {}.",
         um(found.before_mm()),
         um(found.left_most_mm)
     );
