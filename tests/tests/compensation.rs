@@ -298,6 +298,18 @@ fn the_fastest_take_up_is_no_fault() {
     }
 }
 
+/// The first tick in which X goes backward.
+fn first_backward(plan: &Plan, machine: &Machine) -> u64 {
+    let mut first = None;
+    run_with(&RunOptions::default(), plan, machine, &mut |row| {
+        if row.axes[0].vel_mm_s < -1e-3 {
+            first = first.or(Some(row.tick));
+        }
+    })
+    .expect("a run");
+    first.expect("it goes backward")
+}
+
 /// A drive or an encoder that is reversed is found as that while play is taken up, just after it, and long after.
 #[test]
 fn a_runaway_is_found_in_a_take_up_and_after_it() {
@@ -305,14 +317,10 @@ fn a_runaway_is_found_in_a_take_up_and_after_it() {
     for (is_inverted, play_mm) in [(false, 0.02), (true, 0.02), (false, 0.3), (true, 0.3)] {
         let machine = worn(play_mm, is_inverted);
         let plan: Plan = motion_tests::check::planned(program, &machine).expect("a plan");
-        let mut backward = Vec::new();
-        run_with(&RunOptions::default(), &plan, &machine, &mut |row| {
-            backward.extend((row.axes[0].vel_mm_s < -1e-3).then_some(row.tick));
-        })
-        .expect("a run");
+        let reversal = first_backward(&plan, &machine);
         for fault in ["drive-reversed=X", "encoder-reversed=X"] {
             for after_ticks in [0, 2, 5, 10, 40, 90, 130, 170] {
-                let broken_at = backward[0] + after_ticks;
+                let broken_at = reversal + after_ticks;
                 let injections: Injections = format!("{broken_at}:{fault}").parse().expect("an injection");
                 let options = RunOptions { injections: Some(&injections), ..RunOptions::default() };
                 let faults = run_with(&options, &plan, &machine, &mut |_| {}).expect("a run").faults;
@@ -325,6 +333,46 @@ fn a_runaway_is_found_in_a_take_up_and_after_it() {
             }
         }
     }
+}
+
+/// A loss of velocity that no load explains is found long after a take-up as soon as on a machine without play, by the samples
+/// alone: the following error is not bounded here.
+#[test]
+fn samples_are_judged_again_after_a_take_up() {
+    let program = "G21 G90 G61\nG0 X60\nG0 X0\nM2\n";
+    let loose = |machine: &mut Machine| {
+        machine.axes[0].following_error_limit_mm = 400.0;
+        machine.axes[0].drive.coulomb_friction_mm_s2 = 10.0;
+    };
+    let (mut with, mut without) = (worn(0.02, true), machine(Screws::Ideal, true));
+    loose(&mut with);
+    loose(&mut without);
+    // Compensation changes no plan.
+    let plan: Plan = motion_tests::check::planned(program, &without).expect("a plan");
+    let reversal = first_backward(&plan, &without);
+    let mut latest = [0; 2];
+    for broken_at in (reversal + 300..reversal + 348).step_by(3) {
+        let found = [&with, &without].map(|machine| {
+            let injections: Injections =
+                format!("{broken_at}:drive-reversed=X").parse().expect("an injection");
+            let options = RunOptions { injections: Some(&injections), ..RunOptions::default() };
+            let mut velocity_mm_s = 0.0;
+            let faults = run_with(&options, &plan, machine, &mut |row| {
+                if row.tick == broken_at {
+                    velocity_mm_s = row.axes[0].vel_mm_s;
+                }
+            })
+            .expect("a run")
+            .faults;
+            assert!(velocity_mm_s < -20.0, "backward, long after the take-up: {velocity_mm_s}");
+            let first = faults.first().expect("a fault");
+            assert_eq!(first.fault, "runaway", "{first:?}");
+            first.tick - broken_at
+        });
+        latest = [latest[0].max(found[0]), latest[1].max(found[1])];
+    }
+    println!("at most {latest:?} ticks after it broke, with play and without");
+    assert!(latest[0] <= latest[1], "{latest:?}");
 }
 
 /// Play and error found from where an instrument sees the load compensate as well as those that are known.

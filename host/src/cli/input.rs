@@ -144,13 +144,11 @@ pub(super) fn differ(
 
 /// Reads the file of a machine of any number of axes; without one, the reference machine.
 pub(super) fn any_machine(path: Option<&PathBuf>) -> Result<AnyMachine, CliError> {
-    match path {
-        Some(path) => {
-            let (name, text) = machine_text(path)?;
-            Ok(AnyMachine::from_toml(&name, &text)?)
-        }
-        None => Ok(AnyMachine::Three(Box::new(Machine::reference()))),
+    if path.is_none() {
+        return Ok(AnyMachine::Three(Box::new(Machine::reference())));
     }
+    let MachineText { name, text } = MachineText::read(path)?;
+    Ok(AnyMachine::from_toml(&name, &text)?)
 }
 
 /// Reads the file of a machine of X, Y and Z, in this order, for commands that know their axes by it; without a file, the
@@ -171,8 +169,11 @@ impl MachineText {
         let Some(path) = path else {
             return Ok(Self { name: "reference.toml".to_owned(), text: REFERENCE_TOML.to_owned() });
         };
-        let (name, text) = machine_text(path)?;
-        Ok(Self { name, text })
+        let name = path.display().to_string();
+        match fs::read_to_string(path) {
+            Ok(text) => Ok(Self { name, text }),
+            Err(source) => Err(CliError::Read { path: name, source }),
+        }
     }
 
     /// The machine of X, Y and Z, in this order.
@@ -188,13 +189,5 @@ impl MachineText {
             found: format!("{} with the axes {}", self.name, letters.join(", ")),
             expected,
         })
-    }
-}
-
-fn machine_text(path: &Path) -> Result<(String, String), CliError> {
-    let name = path.display().to_string();
-    match fs::read_to_string(path) {
-        Ok(text) => Ok((name, text)),
-        Err(source) => Err(CliError::Read { path: name, source }),
     }
 }

@@ -17,6 +17,9 @@
 //! the right one. The model knows nothing of backlash, cogging and pitch errors. Where these matter,
 //! [`Identification::misfit_per_reading`] is far above 1, and intervals are as wide as what is left allows.
 //!
+//! A screw between motor and load is another matter: no encoder on a motor sees its backlash and pitch error. [`identify_screw`]
+//! finds them from where an instrument saw the load.
+//!
 //! # Example
 //!
 //! ```

@@ -8,7 +8,7 @@
 //! curve e through a table's points is linear in them, so points and play follow from least squares. Which table it is, if
 //! any, is chosen by the Bayesian criterion n·ln(RSS/n) + k·ln n (Schwarz 1978) among all numbers of points, over the travel and,
 //! where a turn's length is given, over a turn. Intervals are of Student's distribution with the chosen table; what the table
-//! can't follow widens them.
+//! can't follow raises the scatter, and so widens them in part.
 
 use core::ops::RangeInclusive;
 
@@ -86,7 +86,7 @@ impl ScrewFound {
     /// The reading that is farthest from the model, if that is no scatter: its row may be wrong.
     #[must_use]
     pub fn outlier(&self) -> Option<&ExplainedReading> {
-        let left_mm = |reading: &ExplainedReading| (reading.error_mm - reading.model_mm).abs();
+        let left_mm = |reading: &ExplainedReading| reading.left_mm().abs();
         let mut all_mm: Vec<f64> = self.readings.iter().map(left_mm).collect();
         all_mm.sort_by(f64::total_cmp);
         let deviation_mm = DEVIATION_PER_MEDIAN * all_mm.get(all_mm.len() / 2)? + ROUNDING_MM;
@@ -124,6 +124,14 @@ pub struct ExplainedReading {
     pub error_mm: f64,
     /// What the model says \[mm\].
     pub model_mm: f64,
+}
+
+impl ExplainedReading {
+    /// What the model leaves \[mm\].
+    #[must_use]
+    pub fn left_mm(&self) -> f64 {
+        self.error_mm - self.model_mm
+    }
 }
 
 /// Why a screw can't be told from readings.
@@ -302,12 +310,9 @@ fn means(readings: &[Directed]) -> Vec<Directed> {
     sorted.chunk_by(|a, b| of_place(a) == of_place(b)).map(mean).collect()
 }
 
-/// In how many different places there are readings.
-fn places_of(readings: &[Directed]) -> usize {
-    let mut places_mm: Vec<f64> = readings.iter().map(|reading| reading.commanded_mm).collect();
-    places_mm.sort_by(f64::total_cmp);
-    places_mm.dedup();
-    places_mm.len()
+/// In how many different places there are means.
+fn places_of(means: &[Directed]) -> usize {
+    means.chunk_by(|a, b| a.commanded_mm == b.commanded_mm).count()
 }
 
 /// A table's places.
@@ -372,8 +377,8 @@ struct Fit {
     places: Option<Places>,
     /// Points of the table, or the error that is the same everywhere, then the play \[mm\].
     unknowns: Vec<f64>,
-    /// Of the normal equations.
-    inverse: Symmetric,
+    /// The normal equations.
+    normal: Symmetric,
     sum_of_squares_mm2: f64,
     readings: usize,
     /// In how many places.
@@ -401,10 +406,9 @@ impl Fit {
             }
         }
         let unknowns = normal.solve(&right)?;
-        let inverse = normal.inverse()?;
         let (readings_read, places_read) = (readings.len(), places_of(readings));
         let mut fit =
-            Self { places, unknowns, inverse, sum_of_squares_mm2: 0.0, readings: readings_read, places_read };
+            Self { places, unknowns, normal, sum_of_squares_mm2: 0.0, readings: readings_read, places_read };
         fit.sum_of_squares_mm2 = readings
             .iter()
             .zip(loads_mm)
@@ -437,14 +441,14 @@ impl Fit {
         places * mean_mm2.ln() + unknowns * places.ln()
     }
 
-    /// Half of the 95 % interval of a sum of unknowns.
-    fn half_width_95(&self, weights: &[f64]) -> f64 {
+    /// Half of the 95 % interval of a sum of unknowns, by the inverse of the normal equations.
+    fn half_width_95(&self, inverse: &Symmetric, weights: &[f64]) -> f64 {
         let freedom = (self.readings - self.unknowns.len()) as f64;
         let scatter_mm2 = self.sum_of_squares_mm2 / freedom + ROUNDING_MM * ROUNDING_MM;
-        let order = self.inverse.order();
+        let order = inverse.order();
         let variance: f64 = (0..order)
             .flat_map(|i| (0..order).map(move |j| (i, j)))
-            .map(|(i, j)| weights[i] * weights[j] * self.inverse.at(i, j))
+            .map(|(i, j)| weights[i] * weights[j] * inverse.at(i, j))
             .sum();
         students_quantile(freedom) * (scatter_mm2 * variance).sqrt()
     }
@@ -475,11 +479,13 @@ impl Fit {
 
     fn found(&self, readings: &[Directed], reference: ScrewReference) -> Result<ScrewFound, ScrewError> {
         let order = self.unknowns.len();
+        let inverse = self.normal.inverse().expect("solved for the unknowns, so positive");
         let weights = |of: &dyn Fn(usize) -> f64| (0..order).map(of).collect::<Vec<f64>>();
         let play = order - 1;
         let backlash_mm = Estimate {
             value: self.unknowns[play],
-            half_width_95: self.half_width_95(&weights(&|index| f64::from(u8::from(index == play)))),
+            half_width_95: self
+                .half_width_95(&inverse, &weights(&|index| f64::from(u8::from(index == play)))),
         };
         if backlash_mm.value < -CERTAIN * backlash_mm.half_width_95 {
             let Estimate { value, half_width_95 } = backlash_mm;
@@ -492,10 +498,13 @@ impl Fit {
         let pitch_error = self.table()?.map(|table| {
             let count = table.point_count();
             let of_point = |point: usize| {
-                self.half_width_95(&weights(&|index| match index {
-                    index if index == play => 0.0,
-                    index => f64::from(u8::from(index == point)) - 1.0 / count as f64,
-                }))
+                self.half_width_95(
+                    &inverse,
+                    &weights(&|index| match index {
+                        index if index == play => 0.0,
+                        index => f64::from(u8::from(index == point)) - 1.0 / count as f64,
+                    }),
+                )
             };
             // What is common to both directions of a place is as good as one reading.
             let common = (self.readings as f64 / self.places_read as f64).sqrt();
@@ -516,7 +525,7 @@ impl Fit {
                 }
             })
             .collect();
-        let left_mm = || explained.iter().map(|reading| reading.error_mm - reading.model_mm);
+        let left_mm = || explained.iter().map(ExplainedReading::left_mm);
         let left_most_mm = left_mm().map(f64::abs).fold(0.0, f64::max);
         let left_rms_mm = (left_mm().map(|mm| mm * mm).sum::<f64>() / readings.len() as f64).sqrt();
         Ok(ScrewFound { backlash_mm, pitch_error, left_rms_mm, left_most_mm, readings: explained })

@@ -78,8 +78,7 @@ pub fn compensated(
             let table = child(compensation, "pitch_error");
             set(table, "start_mm", Some(error.start_mm));
             set(table, "spacing_mm", Some(error.spacing_mm));
-            let points_um = (0..error.point_count()).filter_map(|point| error.point_um(point));
-            put(table, "points_um", points_um.collect::<toml_edit::Array>());
+            put(table, "points_um", error.points_um().collect::<toml_edit::Array>());
             put(table, "repeats", error.repeats);
         }
     }

@@ -9,6 +9,7 @@ use motion_kernel::jog::Direction;
 use serde::Serialize;
 
 use super::axis_named;
+use super::tune::EstimateJson;
 use crate::cli::error::{CliError, Outcome};
 use crate::cli::input::{self, MachineText};
 use crate::cli::outputs::{self, Written};
@@ -37,9 +38,9 @@ Examples:
   motion drive screw --axis X --from-mm 0 --to-mm 400 --program screw_x.ngc
   motion drive screw --axis X --pitch-mm 5 --from x.csv --machine mine.toml --output mine.toml
 
-JSON: axis, source, readings, backlash_mm {value, half_width_95}, take_up_s (null without backlash), pitch_error (null or {start_mm,
-spacing_mm, repeats, points_um, half_width_95_um}), before_um, left_rms_um, left_most_um, outlier
-(null or {load_mm, off_um}), output, reason.";
+JSON: axis, source, readings, backlash_mm {value, half_width_95, determined}, take_up_s (null without backlash), pitch_error
+(null or {start_mm, spacing_mm, repeats, points_um, half_width_95_um}), before_um, left_rms_um, left_most_um, outlier (null or
+{load_mm, off_um}), output, reason.";
 
 /// What a user should know of an axis that is compensated already.
 const OF_COMPENSATED: &str =
@@ -95,7 +96,7 @@ struct ScrewJson<'run> {
     axis: &'run str,
     source: &'run str,
     readings: usize,
-    backlash_mm: PlayJson,
+    backlash_mm: EstimateJson,
     take_up_s: Option<f64>,
     pitch_error: Option<PitchErrorJson>,
     before_um: f64,
@@ -110,12 +111,6 @@ struct ScrewJson<'run> {
 struct OutlierJson {
     load_mm: f64,
     off_um: f64,
-}
-
-#[derive(Serialize)]
-struct PlayJson {
-    value: f64,
-    half_width_95: f64,
 }
 
 #[derive(Serialize)]
@@ -206,16 +201,13 @@ pub fn run(arguments: &ScrewArguments, out: &mut dyn Write) -> Result<Outcome, C
             axis: name,
             source: &measured,
             readings: found.readings.len(),
-            backlash_mm: PlayJson {
-                value: found.backlash_mm.value,
-                half_width_95: found.backlash_mm.half_width_95,
-            },
+            backlash_mm: EstimateJson::of(found.backlash_mm),
             take_up_s: compensation.backlash.map(|backlash| backlash.take_up_s),
             pitch_error: found.pitch_error.map(|error| PitchErrorJson {
                 start_mm: error.table.start_mm,
                 spacing_mm: error.table.spacing_mm,
                 repeats: error.table.repeats,
-                points_um: points_um(&error.table),
+                points_um: error.table.points_um().collect(),
                 half_width_95_um: error.half_width_95_mm * 1e3,
             }),
             before_um: found.before_mm() * 1e3,
@@ -223,7 +215,7 @@ pub fn run(arguments: &ScrewArguments, out: &mut dyn Write) -> Result<Outcome, C
             left_most_um: found.left_most_mm * 1e3,
             outlier: found.outlier().map(|reading| OutlierJson {
                 load_mm: reading.load_mm,
-                off_um: (reading.error_mm - reading.model_mm).abs() * 1e3,
+                off_um: reading.left_mm().abs() * 1e3,
             }),
             output: written.place_of("machine file"),
             reason: reason.or_else(|| written.failure_of("machine file")),
@@ -276,10 +268,6 @@ fn compensation(found: &ScrewFound, settings: &AxisSettings, tick_s: f64) -> Axi
     AxisCompensation { backlash, pitch_error: found.pitch_error.map(|error| error.table) }
 }
 
-fn points_um(table: &motion_kernel::axis::PitchError) -> Vec<f64> {
-    (0..table.point_count()).filter_map(|point| table.point_um(point)).collect()
-}
-
 fn write_words(found: &ScrewFound, compensation: &AxisCompensation, out: &mut dyn Write) -> io::Result<()> {
     let play = found.backlash_mm;
     let (play_um, half_um) = (play.value * 1e3, play.half_width_95 * 1e3);
@@ -292,25 +280,24 @@ fn write_words(found: &ScrewFound, compensation: &AxisCompensation, out: &mut dy
     match &found.pitch_error {
         None => writeln!(out, "  pitch error      none that a table would explain better than chance")?,
         Some(error) => {
-            let points_um = points_um(&error.table);
-            let most_um = points_um.iter().fold(0.0, |most: f64, um| most.max(um.abs()));
+            let points = error.table.point_count();
+            let most_um = error.table.points_um().map(f64::abs).fold(0.0, f64::max);
             let over = if error.table.repeats {
-                format!("a turn of {:.4} mm", error.table.spacing_mm * points_um.len() as f64)
+                format!("a turn of {:.4} mm", error.table.spacing_mm * points as f64)
             } else {
-                format!("{:.1} mm of travel", error.table.spacing_mm * (points_um.len() - 1) as f64)
+                format!("{:.1} mm of travel", error.table.spacing_mm * (points - 1) as f64)
             };
             let half_um = error.half_width_95_mm * 1e3;
             writeln!(
                 out,
-                "  pitch error      {} points over {over}, at most {most_um:.2} µm, each ± {half_um:.2} µm",
-                points_um.len()
+                "  pitch error      {points} points over {over}, at most {most_um:.2} µm, each ± {half_um:.2} µm"
             )?;
         }
     }
     let (before_um, left_um) = (found.before_mm() * 1e3, found.left_most_mm * 1e3);
     let rms_um = found.left_rms_mm * 1e3;
     if let Some(reading) = found.outlier() {
-        let off_um = (reading.error_mm - reading.model_mm).abs() * 1e3;
+        let off_um = reading.left_mm().abs() * 1e3;
         writeln!(
             out,
             "  note: the reading at {:.3} mm is {off_um:.2} µm off, more than scatter: is its row right?",

@@ -596,11 +596,7 @@ pub(super) struct FoundJson {
 impl FoundJson {
     pub(super) fn of(found: &Identification) -> Self {
         let parameters = &found.parameters;
-        let estimate = |estimate: Estimate| EstimateJson {
-            value: estimate.value,
-            half_width_95: Some(estimate.half_width_95).filter(|width| width.is_finite()),
-            determined: estimate.is_determined(),
-        };
+        let estimate = EstimateJson::of;
         FoundJson {
             command_gain: estimate(parameters.command_gain),
             command_offset_mm_s: estimate(parameters.command_offset_mm_s),
@@ -631,11 +627,21 @@ struct BedJson {
 }
 
 #[derive(Serialize)]
-struct EstimateJson {
+pub(super) struct EstimateJson {
     value: f64,
     /// Null if it is unbounded.
     half_width_95: Option<f64>,
     determined: bool,
+}
+
+impl EstimateJson {
+    pub(super) fn of(estimate: Estimate) -> Self {
+        Self {
+            value: estimate.value,
+            half_width_95: Some(estimate.half_width_95).filter(|width| width.is_finite()),
+            determined: estimate.is_determined(),
+        }
+    }
 }
 
 #[derive(Serialize)]

@@ -37,7 +37,6 @@ pub fn screw_findings(machine: &Machine, axis: usize, found: &ScrewFound, is_ref
     };
     let measured = |reading: &ExplainedReading| reading.error_mm;
     let model = |reading: &ExplainedReading| reading.model_mm;
-    let left = |reading: &ExplainedReading| reading.error_mm - reading.model_mm;
     let graphs = vec![
         Graph::new(
             "Error",
@@ -53,8 +52,8 @@ pub fn screw_findings(machine: &Machine, axis: usize, found: &ScrewFound, is_ref
             "Left",
             "µm",
             vec![
-                Series::dots("positive", palette::series(0), of(false, &left)),
-                Series::dots("negative", palette::series(1), of(true, &left)),
+                Series::dots("positive", palette::series(0), of(false, &ExplainedReading::left_mm)),
+                Series::dots("negative", palette::series(1), of(true, &ExplainedReading::left_mm)),
             ],
         ),
     ];

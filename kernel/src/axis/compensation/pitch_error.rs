@@ -69,7 +69,12 @@ impl PitchError {
     /// The error at a point, from 0 \[µm\].
     #[must_use]
     pub fn point_um(&self, index: usize) -> Option<f64> {
-        self.points().get(index).map(|&step| f64::from(step) / STEPS_PER_UM)
+        self.points_um().nth(index)
+    }
+
+    /// The errors at all points \[µm\].
+    pub fn points_um(&self) -> impl Iterator<Item = f64> + '_ {
+        self.points().iter().map(|&step| f64::from(step) / STEPS_PER_UM)
     }
 
     /// The greatest slope from point to point, in either direction \[mm/mm\].
