@@ -166,7 +166,7 @@ pub enum ScrewError {
     },
     /// A turn that readings do not cover.
     #[error(
-        "found {places} places over {covered_mm} mm, expected more of them, and some in every part of a turn of {pitch_mm} mm"
+        "found {places} places over {covered_mm:.1} mm, expected more of them, and some in every part of a turn of {pitch_mm} mm"
     )]
     Turn {
         /// From the first to the last one \[mm\].
@@ -187,7 +187,7 @@ pub enum ScrewError {
         half_width_um: f64,
     },
     /// More than the kernel compensates.
-    #[error("found {quantity} of {found}, expected at most {most}")]
+    #[error("found {quantity} of {found:.3}, expected at most {most}")]
     Beyond {
         /// Which figure.
         quantity: &'static str,
