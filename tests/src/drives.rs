@@ -230,10 +230,19 @@ impl Surveyed {
                 _ => {}
             }
         }
-        let margins_off = self.margins.as_ref().map_or(0.0, margins_off);
-        if !(margins_off <= MARGINS_OFF_MAX) {
+        if let Some(margins @ [claimed, is]) = &self.margins
+            && let off = margins_off(margins)
+            && !(off <= MARGINS_OFF_MAX)
+        {
             let bed = self.axis.drive.bed.map_or_else(String::new, |bed| format!(", {}", bed_words(bed)));
-            wrong.push(format!("margins off by {:.1} %{bed}", 100.0 * margins_off));
+            wrong.push(format!(
+                "margins off by {:.1} %, phase {:.2}°, is {:.2}°, gain {:.3}, is {:.3}{bed}",
+                100.0 * off,
+                claimed.phase_deg,
+                is.phase_deg,
+                claimed.gain,
+                is.gain
+            ));
         }
         wrong.extend(self.circles.worse.iter().cloned());
         wrong
@@ -276,9 +285,9 @@ pub fn surveyed(seed: u64, circles_hz: &[f64]) -> Surveyed {
     let has_bed = found.as_ref().is_ok_and(|found| found.parameters.bed.is_some());
     let is_met = found.as_ref().is_ok_and(Identification::is_met);
     let tuned = found.as_ref().ok().and_then(|found| Some((found, tuning(&axis, found)?)));
-    let margins = tuned.as_ref().map(|(_, tuning)| {
-        [tuning.margins, Margins::of(&axis.drive, tuning.gains.kp_per_s, REFERENCE_TICK_S)]
-    });
+    let margins = tuned
+        .as_ref()
+        .map(|(_, tuning)| [tuning.margins, Margins::of(&axis.drive, tuning.gains, REFERENCE_TICK_S)]);
     let circles =
         tuned.map_or_else(Circles::default, |(found, tuning)| circles(&axis, found, &tuning, circles_hz));
     let found = match found {

@@ -4,6 +4,7 @@
 //! its resonance of 13 Hz.
 
 use motion_host::drive::circle::{self, CircleFigures};
+use motion_host::drive::experiment::Recording;
 use motion_host::drive::identification::identify_axes;
 use motion_host::machine::Machine;
 use motion_host::tuning::{AxisTuning, Margins, Method, propose};
@@ -87,8 +88,7 @@ fn changed(machine: &Machine, change: &dyn Fn(&mut hal_sim::DriveParameters)) ->
 }
 
 /// Each of Kv, Ti, dead time and inertia off by a fifth, then all of them slow together. Y has three times the friction
-/// of X, whose compensation is off with Kv, and keeps more error: 2.0 µm where X has 1.3, beyond the 1.5 µm that both
-/// should keep. docs/PROMISES.md states these figures.
+/// of X, whose compensation is off with Kv, and keeps more error. docs/PROMISES.md states these figures.
 #[test]
 fn a_fifth_of_any_parameter_may_change() {
     type Change = fn(&mut hal_sim::DriveParameters, f64);
@@ -104,10 +104,10 @@ fn a_fifth_of_any_parameter_may_change() {
             println!("{name} × {by}");
             let machine = changed(&machine, &|drive| change(drive, by));
             let following_um = circle(&machine, 4.0).following_um;
-            assert!(following_um[0] <= 1.35 && following_um[1] <= 2.05, "{name} {by}: {following_um:?}");
+            assert!(following_um[0] <= 0.5 && following_um[1] <= 1.05, "{name} {by}: {following_um:?}");
             for frequency_hz in [10.0, 13.0, 16.0, 19.0, 22.0, 25.0] {
                 let contour_um = circle(&machine, frequency_hz).contour_um();
-                assert!(contour_um <= 20.0, "{name} {by}, {frequency_hz} Hz: {contour_um}");
+                assert!(contour_um <= 14.0, "{name} {by}, {frequency_hz} Hz: {contour_um}");
             }
         }
     }
@@ -120,11 +120,74 @@ fn a_fifth_of_any_parameter_may_change() {
         drive.load_inertia_ratio = 0.2;
     });
     let following_um = circle(&machine, 4.0).following_um;
-    assert!(following_um[0] <= 4.2 && following_um[1] <= 4.55, "{following_um:?}");
-    for frequency_hz in [8.0, 10.0, 11.0] {
+    assert!(following_um[0] <= 1.4 && following_um[1] <= 1.7, "{following_um:?}");
+    for frequency_hz in [8.0, 11.0, 16.0, 19.0] {
         let contour_um = circle(&machine, frequency_hz).contour_um();
         assert!(contour_um <= 20.0, "{frequency_hz} Hz: {contour_um}");
     }
+}
+
+/// All corners of a fifth of Kv, Ti, dead time, inertia, current lag and Coulomb friction. Where friction is known, the worst
+/// has Kv low and all else slow. What friction lacks in the inverse is a step at each reversal, which bandwidth bounds.
+#[test]
+fn a_fifth_of_all_parameters_may_change_at_once() {
+    let (machine, tunings) = tuned(&Machine::reference(), Method::Inverse);
+    let mut worst = [[(0.0_f64, 0_u32); 2]; 2];
+    for corner in 0..64_u32 {
+        let by = |bit: u32| if corner >> bit & 1 == 0 { 0.8 } else { 1.2 };
+        for friction in [1.0, by(5)] {
+            let machine = changed(&machine, &|drive| {
+                drive.velocity_gain_per_s *= by(0);
+                drive.integral_time_s *= by(1);
+                drive.dead_time_s *= by(2);
+                drive.load_inertia_ratio = by(3) - 1.0;
+                drive.current_lag_s *= by(4);
+                drive.coulomb_friction_mm_s2 *= friction;
+            });
+            let following_um = circle(&machine, 4.0).following_um;
+            for (worst, found_um) in worst[usize::from(friction != 1.0)].iter_mut().zip(following_um) {
+                if found_um > worst.0 {
+                    *worst = (found_um, corner);
+                }
+            }
+            for (axis, tuning) in tunings.iter().enumerate() {
+                let margins = Margins::of(&machine.axes[axis].drive, tuning.gains, machine.tick_s);
+                assert!(margins.is_stable(), "{corner:06b}, axis {axis}: {margins:?}");
+            }
+        }
+    }
+    println!("X and Y, friction as known and not: {worst:?}");
+    let [known, unknown] = worst.map(|axes| axes.map(|(um, _)| um));
+    assert!(known[0] <= 1.45 && known[1] <= 1.85, "{worst:?}");
+    assert!(unknown[0] <= 1.45 && unknown[1] <= 2.8, "{worst:?}");
+}
+
+/// Two integrals would move an axis with friction to and fro for ever. An axis that sticks with up to ten times the friction is
+/// pushed to the count and stays there.
+#[test]
+fn a_tuned_axis_rests() {
+    let (tuned, _) = tuned(&Machine::reference(), Method::Inverse);
+    let moves = "G1 X10.00003 Y5.00007 F1000\nG4 P3\nG1 X0.01234 Y0.00321 F50\nG4 P8\n";
+    for (friction, leak) in [(1.0, true), (10.0, true), (1.0, false), (10.0, false)] {
+        let mut machine = changed(&tuned, &|drive| drive.coulomb_friction_mm_s2 *= friction);
+        if !leak {
+            machine.axes.iter_mut().for_each(|axis| axis.gains.ki_leak_per_s = 0.0);
+        }
+        let run = Recording::of("rest".to_owned(), moves, machine, 1.0).expect("a run");
+        let rest = &run.ticks[run.ticks.len() - 2000..];
+        for axis in 0..2 {
+            let span_um = span(rest.iter().map(|tick| tick.axes[axis].err_um));
+            let span_v = span(rest.iter().map(|tick| tick.axes[axis].out_v));
+            println!("friction × {friction}, leak {leak}, axis {axis}: {span_um:.2} µm, {span_v:.4} V");
+            // A count, and the rounding of its millimetres.
+            let rests = span_um <= 0.1 + 1e-6;
+            assert_eq!(rests, leak, "friction × {friction}, axis {axis}: {span_um} µm, {span_v} V");
+        }
+    }
+}
+
+fn span(values: impl Iterator<Item = f64> + Clone) -> f64 {
+    values.clone().fold(f64::MIN, f64::max) - values.fold(f64::MAX, f64::min)
 }
 
 /// Machines whose Y axis is S4's with every parameter up to 30 % off, with three encoders: found through the kernel,
@@ -162,7 +225,7 @@ fn drives_are_found_tuned_and_stable(count: u64) {
         let delay_s = drive.dead_time_s + drive.current_lag_s + 0.5 * machine.tick_s;
         let delay_off_s = (values.total_delay_s.value - delay_s).abs();
         let tuning = propose(&machine.axes[1], &found, Method::Inverse, machine.tick_s).expect("a proposal");
-        let margins = Margins::of(&drive, tuning.gains.kp_per_s, machine.tick_s);
+        let margins = Margins::of(&drive, tuning.gains, machine.tick_s);
         let axis = &mut machine.axes[1];
         (axis.gains, axis.feedforward) = (tuning.gains, tuning.feedforward);
         axis.output_offset_v = tuning.output_offset_v;

@@ -1,9 +1,10 @@
-//! The drive's linear model, for small signals: without Coulomb friction and current limit.
+//! The linear model of an axis, for small signals: its drive without Coulomb friction and current limit, and its regulator.
 
 use core::f64::consts::TAU;
 use core::ops::{Add, Div, Mul, Sub};
 
 use hal_sim::DriveParameters;
+use motion_kernel::axis::Gains;
 
 /// A complex number, as far as responses need it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -96,6 +97,23 @@ pub fn response(drive: &DriveParameters, tick_s: f64, frequency_hz: f64) -> Comp
     let (sine, cosine) = libm::sincos(-TAU * frequency_hz * (drive.dead_time_s + 0.5 * tick_s));
     let filter = one + real(drive.command_filter_s) * s;
     Complex::new(cosine, sine) / filter * (open / (one + open))
+}
+
+/// Velocity command over following error at a frequency above 0: the regulator with its sum and its difference over
+/// ticks of `tick_s`.
+///
+/// ```text
+/// C = kp + ki·Ts/(1 − (1 − λ·Ts)·z⁻¹) + kd·(1 − z⁻¹)/Ts,   z = e^(s·Ts), λ the leak
+/// ```
+#[must_use]
+pub fn feedback(gains: &Gains, tick_s: f64, frequency_hz: f64) -> Complex {
+    let real = |value: f64| Complex::new(value, 0.0);
+    let (sine, cosine) = libm::sincos(-TAU * frequency_hz * tick_s);
+    let before = Complex::new(cosine, sine);
+    let kept = real(1.0 - gains.ki_leak_per_s * tick_s);
+    real(gains.kp_per_s)
+        + real(gains.ki_per_s2 * tick_s) / (real(1.0) - kept * before)
+        + real(gains.kd / tick_s) * (real(1.0) - before)
 }
 
 /// The frequency at which the linear model's amplitude falls below `ratio` for good \[Hz\], to 0.1 Hz; none

@@ -129,6 +129,8 @@ impl AxisParametersFound {
 pub struct Figures {
     /// The encoder's step \[mm\]: the least difference between two readings.
     pub resolution_mm: f64,
+    /// The standard deviation of the readings of an axis at rest, besides rounding \[mm\].
+    pub reading_noise_mm: f64,
     /// Every velocity step from rest, in the order of the runs.
     pub steps: Vec<StepReading>,
     /// Every harmonic run, in order.
@@ -138,6 +140,14 @@ pub struct Figures {
     /// The greatest acceleration that lasted for 5 ms, friction already overcome \[mm/s²\]. With a run that
     /// saturates the drive: what may be asked of the axis (S4).
     pub sustained_accel_mm_s2: f64,
+}
+
+impl Figures {
+    /// The standard deviation of a reading's error, rounding and noise \[mm\].
+    #[must_use]
+    pub fn reading_error_mm(&self) -> f64 {
+        (self.resolution_mm.powi(2) / 12.0 + self.reading_noise_mm.powi(2)).sqrt()
+    }
 }
 
 /// How well the model follows one run.

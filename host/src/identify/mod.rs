@@ -112,6 +112,7 @@ pub fn figures(runs: &[AxisRecording]) -> Result<Figures, IdentifyError> {
     let harmonics: Vec<_> = runs.iter().filter_map(harmonic_reading::harmonic_reading).collect();
     Ok(Figures {
         resolution_mm,
+        reading_noise_mm: readings::noise_mm2(runs, resolution_mm).sqrt(),
         steps: runs.iter().flat_map(|run| step_reading::step_reading(run, resolution_mm)).collect(),
         bandwidths: harmonic_reading::bandwidths(&harmonics),
         harmonics,

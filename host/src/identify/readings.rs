@@ -353,7 +353,7 @@ impl Runs {
 }
 
 /// The variance of a reading besides rounding \[mm²\], from second differences where the axis is quiet.
-fn noise_mm2(recordings: &[AxisRecording], resolution_mm: f64) -> f64 {
+pub(super) fn noise_mm2(recordings: &[AxisRecording], resolution_mm: f64) -> f64 {
     let (mut squares, mut count) = (0.0, 0.0);
     for readings in recordings.iter().flat_map(quiet) {
         // By then an axis that drifts has reached its velocity.

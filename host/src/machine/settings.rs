@@ -510,7 +510,7 @@ impl AxisSettings {
             mm_s_at_10_v: 20_000.0 / 60.0,
             output_offset_v: 0.0,
             output_limit_v: 10.0,
-            gains: Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 },
+            gains: Gains { kp_per_s: 230.0, ..Gains::default() },
             // The measured machine ran 0.35 of the drive's own J, 6.376715·10⁻⁵ s².
             feedforward: Feedforward {
                 velocity: 1.0,
@@ -589,7 +589,7 @@ impl AxisSettings {
     #[must_use]
     pub fn guard_figures(&self, tick_s: f64) -> GuardFigures {
         let noise_counts = self.noise.map_or(0, |noise| noise.amplitude_counts);
-        let (drive, kp_per_s) = (&self.drive, self.gains.kp_per_s);
+        let (drive, Gains { kp_per_s, kd, .. }) = (&self.drive, self.gains);
         let constant_s = (1.0 + drive.load_inertia_ratio) / drive.velocity_gain_per_s;
         let response_s = drive.dead_time_s + drive.command_filter_s + drive.current_lag_s + 3.0 * constant_s;
         let counts_mm = self.mm_per_count * (2.0 + 4.0 * f64::from(noise_counts));
@@ -603,7 +603,7 @@ impl AxisSettings {
             jump_mm: 2.0 * ((self.accel_mm_s2 + accel_mm_s2) * tick_s * tick_s + counts_mm),
             moving_mm_s: 0.01 * self.feed_mm_s
                 + 2.0 * drive.coulomb_friction_mm_s2 * constant_s
-                + kp_per_s * counts_mm,
+                + (kp_per_s + kd / tick_s) * counts_mm,
             response_s: response_s + 2.0 * constant_s,
             load_accel_mm_s2: (0.1 * accel_mm_s2)
                 .max(2.0 * self.accel_mm_s2)

@@ -8,13 +8,13 @@
 use core::f64::consts::TAU;
 
 use hal_sim::DriveParameters;
-use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward, PREVIEW_TICKS_MAX};
+use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward, Gains, PREVIEW_TICKS_MAX};
 
 use crate::drive::inverse::inverse;
-use crate::drive::model::{Complex, response};
+use crate::drive::model::{Complex, feedback, response};
 
-/// Frequencies over which gains are fitted \[Hz\].
-const FITTED_HZ: core::ops::RangeInclusive<u32> = 1..=20;
+/// Frequencies over which gains are compared \[Hz\].
+pub(super) const FITTED_HZ: core::ops::RangeInclusive<u32> = 1..=20;
 
 /// How feedforward is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -43,17 +43,17 @@ pub fn series(drive: &DriveParameters, tick_s: f64) -> [f64; 2] {
     [late_s + h1, second + late_s * h1 + h2]
 }
 
-/// A \[s\] and J \[s²\] gain that leave the least following error under a position loop of gain `kp_per_s`,
+/// A \[s\] and J \[s²\] gain that leave the least following error under the feedback of `gains`,
 /// in the least squares over harmonic motion of one velocity amplitude.
 #[must_use]
-pub fn fit(drive: &DriveParameters, kp_per_s: f64, tick_s: f64) -> [f64; 2] {
-    // The normal equations of e = (1 − G·(1 + A·s + J·s²))/(s + kp·G), real and imaginary part for each
+pub fn fit(drive: &DriveParameters, gains: &Gains, tick_s: f64) -> [f64; 2] {
+    // The normal equations of e = (1 − G·(1 + A·s + J·s²))/(s + C·G), real and imaginary part for each
     // frequency.
     let (mut aa, mut ab, mut bb, mut ay, mut by) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for frequency_hz in FITTED_HZ.map(f64::from) {
         let s = Complex::new(0.0, TAU * frequency_hz);
         let g = response(drive, tick_s, frequency_hz);
-        let closed = s + Complex::new(kp_per_s, 0.0) * g;
+        let closed = s + feedback(gains, tick_s, frequency_hz) * g;
         let left = Complex::new(1.0 - g.re, -g.im) / closed;
         let (of_a, of_j) = (g * s / closed, g * s * s / closed);
         for (a, b, y) in [(of_a.re, of_j.re, left.re), (of_a.im, of_j.im, left.im)] {
@@ -68,13 +68,14 @@ pub fn fit(drive: &DriveParameters, kp_per_s: f64, tick_s: f64) -> [f64; 2] {
     [(ay * bb - by * ab) / determinant, (by * aa - ay * ab) / determinant]
 }
 
-/// Feedforward for `drive`, whose velocity is `command_gain` times what the output's scale says.
+/// Feedforward for `drive`, whose velocity is `command_gain` times what the output's scale says, under the feedback of
+/// `loop_gains`, which have that factor.
 #[must_use]
 pub fn feedforward(
     method: Method,
     drive: &DriveParameters,
     command_gain: f64,
-    kp_per_s: f64,
+    loop_gains: &Gains,
     tick_s: f64,
 ) -> Feedforward {
     let of = |all: Feedforward| Feedforward {
@@ -106,7 +107,7 @@ pub fn feedforward(
     };
     of(match method {
         Method::Series => gains(series(drive, tick_s)),
-        Method::Fit => gains(fit(drive, kp_per_s, tick_s)),
+        Method::Fit => gains(fit(drive, loop_gains, tick_s)),
         Method::Inverse => inverse(drive, tick_s),
     })
 }
@@ -161,7 +162,7 @@ mod tests {
                 })
                 .sum()
         };
-        let [a, j] = fit(&drive, 230.0, 5e-4);
+        let [a, j] = fit(&drive, &Gains { kp_per_s: 230.0, ..Gains::default() }, 5e-4);
         let best = square([a, j]);
         for (da, dj) in [(1e-5, 0.0), (-1e-5, 0.0), (0.0, 1e-7), (0.0, -1e-7), (1e-5, 1e-7)] {
             assert!(square([a + da, j + dj]) > best);

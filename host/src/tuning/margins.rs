@@ -1,10 +1,11 @@
-//! Margins of the position loop L = kp·G/s, in the linear model with its bed.
+//! Margins of the position loop L = C·G/s, in the linear model with its bed.
 
 use core::f64::consts::{PI, TAU};
 
 use hal_sim::DriveParameters;
+use motion_kernel::axis::Gains;
 
-use crate::drive::model::{Complex, response};
+use crate::drive::model::{Complex, feedback, response};
 
 /// Frequencies per decade that are looked at: a resonance of 3 % damping is 40 of them wide.
 const PER_DECADE: f64 = 1500.0;
@@ -24,36 +25,89 @@ pub struct Margins {
     pub sensitivity: f64,
 }
 
-impl Margins {
-    /// The margins of a loop with gain `kp_per_s` over `drive`, in ticks of `tick_s`.
+/// A drive seen from its position loop, G/s over frequency.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    tick_s: f64,
+    points: Vec<(f64, Complex)>,
+}
+
+/// A loop at a frequency.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LoopPoint {
+    pub(super) hz: f64,
+    pub(super) open: Complex,
+    pub(super) magnitude: f64,
+    /// Its phase, without jumps from one frequency to the next \[rad\].
+    pub(super) phase_rad: f64,
+}
+
+impl Plant {
+    /// What a regulator in ticks of `tick_s` has to do with.
     #[must_use]
-    pub fn of(drive: &DriveParameters, kp_per_s: f64, tick_s: f64) -> Self {
-        let mut margins = Self { crossover_hz: 0.0, phase_deg: 180.0, gain: f64::INFINITY, sensitivity: 1.0 };
+    pub fn new(drive: &DriveParameters, tick_s: f64) -> Self {
         let decades = libm::log10(0.5 / tick_s / LEAST_HZ);
-        let mut before: Option<(Complex, f64, f64)> = None;
-        for index in 0..=(decades * PER_DECADE) as u32 {
-            let frequency_hz = LEAST_HZ * libm::pow(10.0, f64::from(index) / PER_DECADE);
-            let open = open_loop(drive, kp_per_s, tick_s, frequency_hz);
-            let magnitude = open.magnitude();
-            // Unwrapped: the phase never changes by half a circle from one frequency to the next.
-            let phase = before.map_or(open.phase_rad(), |(_, _, last)| {
-                let change = open.phase_rad() - last;
-                last + change - TAU * libm::round(change / TAU)
-            });
-            let closed = Complex::new(1.0 + open.re, open.im).magnitude();
+        let points = (0..=(decades * PER_DECADE) as u32).map(|index| {
+            let hz = LEAST_HZ * libm::pow(10.0, f64::from(index) / PER_DECADE);
+            (hz, position(drive, tick_s, hz))
+        });
+        Self { tick_s, points: points.collect() }
+    }
+
+    /// The loop that `gains` close, by rising frequency.
+    pub(super) fn opened(&self, gains: Gains) -> impl Iterator<Item = LoopPoint> {
+        let mut last = None;
+        self.points.iter().map(move |&(hz, position)| {
+            let open = feedback(&gains, self.tick_s, hz) * position;
+            let phase = open.phase_rad();
+            // The phase never changes by half a circle from one frequency to the next. Where it begins, two integrals are
+            // half a circle late and not early.
+            let phase_rad = match last {
+                Some(last) => phase - TAU * libm::round((phase - last) / TAU),
+                None if phase > PI / 2.0 => phase - TAU,
+                None => phase,
+            };
+            last = Some(phase_rad);
+            LoopPoint { hz, open, magnitude: open.magnitude(), phase_rad }
+        })
+    }
+
+    /// The margins of the loop that `gains` close.
+    #[must_use]
+    pub fn margins(&self, gains: Gains) -> Margins {
+        let mut margins =
+            Margins { crossover_hz: 0.0, phase_deg: 180.0, gain: f64::INFINITY, sensitivity: 1.0 };
+        let mut before: Option<LoopPoint> = None;
+        for point in self.opened(gains) {
+            let closed = Complex::new(1.0 + point.open.re, point.open.im).magnitude();
             margins.sensitivity = margins.sensitivity.max(1.0 / closed);
-            if let Some((_, last_magnitude, last_phase)) = before {
-                if (last_magnitude >= 1.0) != (magnitude >= 1.0) {
-                    margins.crossover_hz = frequency_hz;
-                    margins.phase_deg = margins.phase_deg.min((PI + phase).to_degrees());
+            if let Some(before) = before {
+                if (before.magnitude >= 1.0) != (point.magnitude >= 1.0) {
+                    margins.crossover_hz = point.hz;
+                    margins.phase_deg = margins.phase_deg.min((PI + point.phase_rad).to_degrees());
                 }
-                if last_phase > -PI && phase <= -PI {
-                    margins.gain = margins.gain.min(1.0 / magnitude);
+                if point.turns_over(&before) {
+                    margins.gain = margins.gain.min(1.0 / point.magnitude);
                 }
             }
-            before = Some((open, magnitude, phase));
+            before = Some(point);
         }
         margins
+    }
+}
+
+impl LoopPoint {
+    /// Whether the loop has become half a circle late since `before`.
+    pub(super) fn turns_over(&self, before: &Self) -> bool {
+        before.phase_rad > -PI && self.phase_rad <= -PI
+    }
+}
+
+impl Margins {
+    /// The margins of the loop that `gains` close over `drive`, in ticks of `tick_s`.
+    #[must_use]
+    pub fn of(drive: &DriveParameters, gains: Gains, tick_s: f64) -> Self {
+        Plant::new(drive, tick_s).margins(gains)
     }
 
     /// The additional delay that the loop bears \[s\]: its phase margin at its crossover.
@@ -69,25 +123,42 @@ impl Margins {
     }
 }
 
-/// The position loop L = kp·G/s at a frequency.
+/// G/s at a frequency \[s\]: from a velocity command to the position.
+pub(super) fn position(drive: &DriveParameters, tick_s: f64, frequency_hz: f64) -> Complex {
+    response(drive, tick_s, frequency_hz) / Complex::new(0.0, TAU * frequency_hz)
+}
+
+/// The position loop L = C·G/s at a frequency.
 #[must_use]
-pub fn open_loop(drive: &DriveParameters, kp_per_s: f64, tick_s: f64, frequency_hz: f64) -> Complex {
-    let s = Complex::new(0.0, TAU * frequency_hz);
-    Complex::new(kp_per_s, 0.0) * response(drive, tick_s, frequency_hz) / s
+pub fn open_loop(drive: &DriveParameters, gains: &Gains, tick_s: f64, frequency_hz: f64) -> Complex {
+    feedback(gains, tick_s, frequency_hz) * position(drive, tick_s, frequency_hz)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Figures of an independent computation for S4's X axis: 36.29 Hz, 38.56°, 2.186, 2.298.
+    /// Of the regulator below, likewise.
+    const PID: [f64; 4] = [44.388, 39.11, 2.4591, 2.0201];
+
+    const fn p(kp_per_s: f64) -> Gains {
+        Gains { kp_per_s, ki_per_s2: 0.0, ki_leak_per_s: 0.0, kd: 0.0 }
+    }
+
+    fn close(found: &Margins, [crossover_hz, phase_deg, gain, sensitivity]: [f64; 4]) {
+        assert!((found.crossover_hz - crossover_hz).abs() < 0.1, "{found:?}");
+        assert!((found.phase_deg - phase_deg).abs() < 0.2, "{found:?}");
+        assert!((found.gain - gain).abs() < 0.01, "{found:?}");
+        assert!((found.sensitivity - sensitivity).abs() < 0.01, "{found:?}");
+    }
+
+    /// Figures of an independent computation for S4's X axis.
     #[test]
     fn margins_of_the_reference() {
-        let found = Margins::of(&hal_sim::REFERENCE_X, 230.0, 5e-4);
-        assert!((found.crossover_hz - 36.291).abs() < 0.1, "{found:?}");
-        assert!((found.phase_deg - 38.559).abs() < 0.2, "{found:?}");
-        assert!((found.gain - 2.186).abs() < 0.01, "{found:?}");
-        assert!((found.sensitivity - 2.298).abs() < 0.01, "{found:?}");
-        assert!(found.is_stable() && !Margins::of(&hal_sim::REFERENCE_X, 230.0 * 2.25, 5e-4).is_stable());
+        let found = Margins::of(&hal_sim::REFERENCE_X, p(230.0), 5e-4);
+        close(&found, [36.291, 38.559, 2.186, 2.298]);
+        assert!(found.is_stable() && !Margins::of(&hal_sim::REFERENCE_X, p(230.0 * 2.25), 5e-4).is_stable());
+        let pid = Gains { kp_per_s: 262.0, ki_per_s2: 15_700.0, ki_leak_per_s: 72.7, kd: 0.4 };
+        close(&Margins::of(&hal_sim::REFERENCE_X, pid, 5e-4), PID);
     }
 }

@@ -8,8 +8,8 @@ use motion_kernel::axis::{
 use motion_kernel::units::DacCode;
 
 use super::error::TuningError;
-use super::feedforward::{Method, feedforward, rounded};
-use super::gains::{GAIN_MIN, PHASE_MIN_DEG, proportional};
+use super::feedforward::{Method, feedforward};
+use super::gains::{GAIN_MIN, NOISE_PART, PHASE_MIN_DEG, best, kd_max, scaled, written};
 use super::known::{Known, Origin};
 use super::margins::Margins;
 use crate::identify::{AxisParametersFound, BedEstimate, Estimate, Identification};
@@ -59,20 +59,24 @@ pub fn propose(
 ) -> Result<AxisTuning, TuningError> {
     let parameters = &found.parameters;
     let known = Known::new(axis, parameters, tick_s)?;
-    let drive = &known.drive;
+    // Feedforward does nothing for what is not known. A loop has it all the same: what explains the recordings best.
+    let (drive, looped) = (&known.drive, &parameters.drive());
     let gain = command_gain(parameters);
-    let (kp_per_s, _) = proportional(drive, tick_s);
+    let limit = parameters.accel_limit_mm_s2;
+    let limit_mm_s2 = if limit.is_determined() { limit.value } else { axis.accel_mm_s2 };
+    let kd_max = kd_max(looped, tick_s, found.figures.reading_error_mm(), limit_mm_s2);
     // The drive's velocity is `gain` times what the scale says, and so is the loop's gain.
-    let kp_per_s = rounded(libm::floor(kp_per_s / gain));
+    let gains = written(scaled(best(looped, tick_s, kd_max), 1.0 / gain));
+    let loop_gains = scaled(gains, gain);
     let mut tuning = AxisTuning {
-        gains: Gains { kp_per_s, ki_per_s2: 0.0, kd: 0.0 },
-        feedforward: feedforward(method, drive, gain, kp_per_s * gain, tick_s),
+        gains,
+        feedforward: feedforward(method, drive, gain, &loop_gains, tick_s),
         output_offset_v: offset_v(axis, parameters),
-        margins: Margins::of(drive, kp_per_s * gain, tick_s),
+        margins: Margins::of(looped, loop_gains, tick_s),
         changes: Vec::new(),
         remarks: remarks(axis, found),
     };
-    let series = || feedforward(Method::Series, drive, gain, kp_per_s * gain, tick_s);
+    let series = || feedforward(Method::Series, drive, gain, &loop_gains, tick_s);
     simplify(axis, &mut tuning, tick_s, series)?;
     if tuning.feedforward.drive.is_none() {
         tuning.feedforward.tables = axis.feedforward.tables;
@@ -190,6 +194,7 @@ fn changes(
         reason,
     };
     let (was, is, margins) = (&axis.feedforward, &tuning.feedforward, &tuning.margins);
+    let gains = &tuning.gains;
     let from = |method_is: &str| match (is.drive, is.accel_s > 0.0) {
         (None, _) if method == Method::Fit => "least following error from 1 to 20 Hz".to_owned(),
         (None, _) => method_is.to_owned(),
@@ -215,24 +220,46 @@ fn changes(
             Some(tuning.gains.kp_per_s),
             "1/s",
             format!(
-                "the greatest with {PHASE_MIN_DEG}° of phase and a factor {GAIN_MIN} of gain in hand: crossover {:.1} Hz, \
-                 phase margin {:.1}°, gain margin {:.2}, errors magnified at most {:.2} times",
+                "leaves least of disturbances from 1 to 20 Hz, with {PHASE_MIN_DEG}° of phase and a factor {GAIN_MIN} of gain in \
+                 hand: crossover {:.1} Hz, phase margin {:.1}°, gain margin {:.2}, errors magnified at most {:.2} times",
                 margins.crossover_hz, margins.phase_deg, margins.gain, margins.sensitivity
             ),
         ),
         change(
             "regulator.ki_per_s2",
             Some(axis.gains.ki_per_s2),
-            Some(0.0),
+            Some(gains.ki_per_s2),
             "1/s²",
-            "the drive's own controller integrates; drift is trimmed by offset_v".to_owned(),
+            if gains.ki_per_s2 > 0.0 {
+                format!(
+                    "takes off in some {:.0} ms what the feedforward lacks of friction and inertia",
+                    1e3 * gains.kp_per_s / gains.ki_per_s2
+                )
+            } else {
+                "lag leaves no room for it".to_owned()
+            },
+        ),
+        change(
+            "regulator.ki_leak_per_s",
+            (axis.gains.ki_leak_per_s != 0.0).then_some(axis.gains.ki_leak_per_s),
+            (gains.ki_leak_per_s != 0.0).then_some(gains.ki_leak_per_s),
+            "1/s",
+            "a quarter above the rate at which the drive integrates: two integrals would not let an axis with friction rest"
+                .to_owned(),
         ),
         change(
             "regulator.kd",
             Some(axis.gains.kd),
-            Some(0.0),
+            Some(gains.kd),
             "",
-            "differences of encoder counts are noise where phase would be won".to_owned(),
+            if gains.kd > 0.0 {
+                "makes up for the lag of the drive's velocity loop".to_owned()
+            } else {
+                format!(
+                    "differences of the readings would make more noise than {:.1} % of the current limit, or win no phase",
+                    100.0 * NOISE_PART
+                )
+            },
         ),
         change(
             "regulator.feedforward_velocity",
@@ -379,6 +406,7 @@ fn changes(
 mod tests {
     use hal_sim::{DriveModel, DriveState};
 
+    use super::super::feedforward::rounded;
     use super::*;
     use crate::identify::{AxisRecording, explore, identify};
     use crate::machine::Machine;

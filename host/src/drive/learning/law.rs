@@ -19,7 +19,7 @@ use hal_sim::DriveParameters;
 use motion_kernel::axis::Gains;
 
 use super::fourier;
-use crate::drive::model::{Complex, response};
+use crate::drive::model::{Complex, feedback, response};
 
 /// Relative deviation of the machine's drive from the model: Kv, Ti, Tc, τ and the bed's frequency, in every
 /// combination.
@@ -91,15 +91,9 @@ impl Loop<'_> {
         let one = Complex::new(1.0, 0.0);
         let frequency_hz = frequency_hz.max(REST_HZ);
         let omega = TAU * frequency_hz;
-        let (sine, cosine) = libm::sincos(-omega * self.tick_s);
-        let change = one - Complex::new(cosine, sine);
-        let real = |value: f64| Complex::new(value, 0.0);
-        let feedback = real(self.gains.kp_per_s)
-            + real(self.gains.ki_per_s2 * self.tick_s) / change
-            + real(self.gains.kd / self.tick_s) * change;
-        let forward =
-            real(self.command_gain) * response(drive, self.tick_s, frequency_hz) / Complex::new(0.0, omega);
-        forward / (one + feedback * forward)
+        let gain = Complex::new(self.command_gain, 0.0);
+        let forward = gain * response(drive, self.tick_s, frequency_hz) / Complex::new(0.0, omega);
+        forward / (one + feedback(&self.gains, self.tick_s, frequency_hz) * forward)
     }
 
     /// The fraction of a sine that straight lines between knots keep: sinc².
@@ -274,7 +268,7 @@ fn faded(signal: &[f64], length: usize) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    const GAINS: Gains = Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 };
+    const GAINS: Gains = Gains { kp_per_s: 230.0, ki_per_s2: 0.0, ki_leak_per_s: 0.0, kd: 0.0 };
 
     fn reference(drive: &DriveParameters) -> Loop<'_> {
         Loop { drive, command_gain: 1.0, gains: GAINS, tick_s: 5e-4, knot_ticks: 4 }

@@ -15,7 +15,7 @@ use crate::drive::model;
 use crate::identify::{Described, HarmonicReading, Identification};
 use crate::machine::{AxisSettings, Machine};
 use crate::tuning::AxisTuning;
-use crate::tuning::known::Known;
+use crate::tuning::gains::scaled;
 use crate::tuning::margins::open_loop;
 
 /// Frequencies of the models' curves \[Hz\], and how many there are.
@@ -228,13 +228,11 @@ fn of_drive(machine: &Machine, of: &TunedAxis<'_>) -> Vec<Stack> {
 
 /// The position loop, opened: where its margins are read.
 fn position_loop(tick_s: f64, settings: &AxisSettings, of: &TunedAxis<'_>, tuning: &AxisTuning) -> Stack {
-    // The drive by which the margins were found, which is known wherever there is a proposal.
-    let known = Known::new(settings, &of.found.parameters, tick_s);
-    let drive = known.map_or_else(|_| of.found.parameters.drive(), |known| known.drive);
+    let drive = of.found.parameters.drive();
     // The drive's velocity is this times what is commanded, and so is the loop's gain.
     let scale = of.found.parameters.command_gain.value;
     let [before, after] = [settings.gains, tuning.gains]
-        .map(|gains| curves(|hz| open_loop(&drive, gains.kp_per_s * scale, tick_s, hz)));
+        .map(|gains| curves(|hz| open_loop(&drive, &scaled(gains, scale), tick_s, hz)));
     let of_both = |index: usize| {
         let named = [("before", &before), ("after", &after)];
         Series::numbered(named.map(|(name, curves)| (name.to_owned(), curves[index].clone())))
@@ -242,7 +240,7 @@ fn position_loop(tick_s: f64, settings: &AxisSettings, of: &TunedAxis<'_>, tunin
     let amplitude = Graph::new("Amplitude", "dB", of_both(0)).with_levels(&[0.0]);
     let phase = Graph::new("Phase", "°", of_both(1)).with_levels(&[-180.0]);
     let title = format!("Position loop of {}, opened", settings.name);
-    let words = "With the proportional gain before and after. Dashed: 0 dB and −180°. The phase margin is read where the amplitude is 0 dB, the gain margin where the phase is \
+    let words = "With the gains before and after. Dashed: 0 dB and −180°. The phase margin is read where the amplitude is 0 dB, the gain margin where the phase is \
                  −180°.";
     Stack::new(title, Axis::new("Frequency", "Hz"), CURVE_HZ, vec![amplitude, phase])
         .logarithmic()
