@@ -135,7 +135,9 @@ fn a_fifth_of_all_parameters_may_change_at_once() {
     let mut worst = [[(0.0_f64, 0_u32); 2]; 2];
     for corner in 0..64_u32 {
         let by = |bit: u32| if corner >> bit & 1 == 0 { 0.8 } else { 1.2 };
-        for friction in [1.0, by(5)] {
+        // Without bit 5 friction is known in the first pass.
+        let frictions: &[f64] = if corner < 32 { &[1.0, 0.8] } else { &[1.2] };
+        for &friction in frictions {
             let machine = changed(&machine, &|drive| {
                 drive.velocity_gain_per_s *= by(0);
                 drive.integral_time_s *= by(1);

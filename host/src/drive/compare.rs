@@ -17,7 +17,7 @@
 //! The kernel's regulators run in the kernel. With coarser set-points all of them are
 //! [replayed](super::replay).
 
-use motion_kernel::axis::{Feedforward, Gains};
+use motion_kernel::axis::Feedforward;
 
 use super::AXES;
 use super::circle;
@@ -108,7 +108,7 @@ impl Regulators {
     /// # Errors
     /// Those of [`Circle::record`].
     pub fn new(machine: &Machine, feed_mm_s: f64, progress: &mut dyn FnMut()) -> Result<Self, DriveError> {
-        let machine = p_only(machine);
+        let machine = with_room(machine);
         let fitted = fit(&machine, feed_mm_s, Differences::Three, progress)?;
         let fitted_two = fit(&machine, feed_mm_s, Differences::Two, progress)?;
         Ok(Self { machine, fitted, fitted_two })
@@ -359,20 +359,21 @@ fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     (values.map(|value| value * value).sum::<f64>() / count).sqrt()
 }
 
-/// The machine with its kp as the only feedback, and with room for the following error of P alone.
-fn p_only(machine: &Machine) -> Machine {
+/// The machine with room for the following error of feedback alone.
+fn with_room(machine: &Machine) -> Machine {
     let mut machine = machine.clone();
     for axis in &mut machine.axes {
         axis.following_error_limit_mm = axis.following_error_limit_mm.max(CLOSED_LOOP_ERROR_MM);
-        axis.gains = Gains { kp_per_s: axis.gains.kp_per_s, ..Gains::default() };
     }
     machine
 }
 
-/// The differencing regulator with the machine's gains.
+/// The differencing regulator with the machine's gains. Its integral does not leak.
 fn peer_gains(machine: &Machine) -> [PeerGains; AXES] {
     machine.axes.each_ref().map(|axis| PeerGains {
         p_per_s: axis.gains.kp_per_s,
+        i_per_s2: axis.gains.ki_per_s2,
+        d: axis.gains.kd,
         ..PeerGains::like(&axis.feedforward, machine.tick_s)
     })
 }

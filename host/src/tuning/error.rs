@@ -2,6 +2,7 @@
 
 use motion_kernel::axis::ScaleError;
 
+use super::gains::{GAIN_MIN, KP_MIN_PER_S, PHASE_MIN_DEG};
 use crate::identify::{DETERMINED, Estimate};
 
 /// What was found of an axis is nothing to tune by.
@@ -22,6 +23,15 @@ pub enum TuningError {
         quantity: &'static str,
         /// What is known of it.
         estimate: Estimate,
+    },
+    /// No position loop keeps its margins.
+    #[error(
+        "tuning of axis {axis}: found a lag that leaves no gain of the position loop its margins, expected {PHASE_MIN_DEG}° and a \
+         factor {GAIN_MIN} from kp = {KP_MIN_PER_S} 1/s on"
+    )]
+    Lag {
+        /// The axis's name.
+        axis: String,
     },
     /// The kernel can't run even the series.
     #[error("tuning of axis {axis}: found {} {}, expected {}", .cause.quantity, .cause.value, .cause.expected)]

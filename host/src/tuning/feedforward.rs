@@ -13,8 +13,8 @@ use motion_kernel::axis::{BedInverse, DriveInverse, Feedforward, Gains, PREVIEW_
 use crate::drive::inverse::inverse;
 use crate::drive::model::{Complex, feedback, response};
 
-/// Frequencies over which gains are compared \[Hz\].
-pub(super) const FITTED_HZ: core::ops::RangeInclusive<u32> = 1..=20;
+/// Frequencies over which gains are fitted \[Hz\].
+const FITTED_HZ: core::ops::RangeInclusive<u32> = 1..=20;
 
 /// How feedforward is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

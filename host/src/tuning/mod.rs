@@ -6,7 +6,7 @@
 //! says so.
 //!
 //! - [`margins`]: the distance of a position loop from oscillation;
-//! - [`gains`]: the proportional gain that keeps margins;
+//! - [`gains`]: the gains that keep margins and leave least of disturbances;
 //! - [`feedforward`]: the drive's inverse, its series, or the gains that leave the least error;
 //! - [`known`]: the drive as far as it is known;
 //! - [`proposal`]: the settings of one axis, in words.

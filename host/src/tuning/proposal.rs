@@ -66,7 +66,8 @@ pub fn propose(
     let limit_mm_s2 = if limit.is_determined() { limit.value } else { axis.accel_mm_s2 };
     let kd_max = kd_max(looped, tick_s, found.figures.reading_error_mm(), limit_mm_s2);
     // The drive's velocity is `gain` times what the scale says, and so is the loop's gain.
-    let gains = written(scaled(best(looped, tick_s, kd_max), 1.0 / gain));
+    let best = best(looped, tick_s, kd_max).ok_or_else(|| TuningError::Lag { axis: axis.name.clone() })?;
+    let gains = written(scaled(best, 1.0 / gain));
     let loop_gains = scaled(gains, gain);
     let mut tuning = AxisTuning {
         gains,
@@ -220,7 +221,7 @@ fn changes(
             Some(tuning.gains.kp_per_s),
             "1/s",
             format!(
-                "leaves least of disturbances from 1 to 20 Hz, with {PHASE_MIN_DEG}° of phase and a factor {GAIN_MIN} of gain in \
+                "with ki and kd it leaves least of disturbances, with {PHASE_MIN_DEG}° of phase and a factor {GAIN_MIN} of gain in \
                  hand: crossover {:.1} Hz, phase margin {:.1}°, gain margin {:.2}, errors magnified at most {:.2} times",
                 margins.crossover_hz, margins.phase_deg, margins.gain, margins.sensitivity
             ),
@@ -232,11 +233,11 @@ fn changes(
             "1/s²",
             if gains.ki_per_s2 > 0.0 {
                 format!(
-                    "takes off in some {:.0} ms what the feedforward lacks of friction and inertia",
+                    "takes off what the feedforward lacks of friction and inertia, as much as kp within {:.0} ms",
                     1e3 * gains.kp_per_s / gains.ki_per_s2
                 )
             } else {
-                "lag leaves no room for it".to_owned()
+                "kp leaves less of disturbances without it".to_owned()
             },
         ),
         change(
@@ -244,8 +245,13 @@ fn changes(
             (axis.gains.ki_leak_per_s != 0.0).then_some(axis.gains.ki_leak_per_s),
             (gains.ki_leak_per_s != 0.0).then_some(gains.ki_leak_per_s),
             "1/s",
-            "a quarter above the rate at which the drive integrates: two integrals would not let an axis with friction rest"
-                .to_owned(),
+            if gains.ki_leak_per_s > 0.0 {
+                "a quarter above the rate at which the drive integrates: two integrals would not let an axis with friction \
+                 rest"
+            } else {
+                "it goes with ki"
+            }
+            .to_owned(),
         ),
         change(
             "regulator.kd",
@@ -256,7 +262,7 @@ fn changes(
                 "makes up for the lag of the drive's velocity loop".to_owned()
             } else {
                 format!(
-                    "differences of the readings would make more noise than {:.1} % of the current limit, or win no phase",
+                    "kp leaves less without it, of a kd whose noise of the readings is below {:.1} % of the current limit",
                     100.0 * NOISE_PART
                 )
             },

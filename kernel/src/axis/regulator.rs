@@ -118,7 +118,8 @@ impl<R: Real> Regulator<R> {
         let change_mm = error_mm - state.last_error_mm;
         state.last_error_mm = error_mm;
         let feedforward = self.feedforward.tick(&mut state.feedforward, setpoint) + state.correction_mm_s;
-        let integral_mm_s = state.integral_mm_s * self.kept + self.ki * error_mm;
+        let kept_mm_s = state.integral_mm_s * self.kept;
+        let integral_mm_s = kept_mm_s + self.ki * error_mm;
         let wanted = feedforward + self.kp * error_mm + self.kd * change_mm + integral_mm_s;
         let (least, greatest) = limits;
         let (velocity_mm_s, saturated, winding_up) = if wanted > greatest {
@@ -128,9 +129,7 @@ impl<R: Real> Regulator<R> {
         } else {
             (wanted, false, false)
         };
-        if !winding_up {
-            state.integral_mm_s = integral_mm_s;
-        }
+        state.integral_mm_s = if winding_up { kept_mm_s } else { integral_mm_s };
         Command { velocity_mm_s, saturated }
     }
 }

@@ -3,7 +3,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | `MOTN` |
-//! | 1 | version of this format: 6, or 7 of a machine with compensation |
+//! | 1 | version of this format: 8, or 9 of a machine with compensation |
 //! | 1 | number of axes |
 //! | 2 | length of guards, homing and compensation together, least significant byte first; 0 for none |
 //! | … | [`Guards`] in the [postcard](https://postcard.jamesmunns.com) wire format, and behind them, if any axis is homed or compensated, `HomingFigures`; a kernel without guards skips both. Behind them, in format 9, `Compensation`; a kernel without compensation does not read that format |
@@ -67,7 +67,7 @@ pub enum ProgramError {
     NotAProgram,
     /// It has another version of the format.
     Version {
-        /// Its version; 6 is expected, or 7 by a kernel with compensation.
+        /// Its version; 8 is expected, or 9 by a kernel with compensation.
         found: u8,
     },
     /// It is for a machine with another number of axes.

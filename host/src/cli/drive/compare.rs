@@ -25,8 +25,8 @@ const OUTPUT_SPAN_S: f64 = 0.1;
 const RESOLUTIONS_MAX: usize = 10;
 
 const HELP: &str = "\
-All regulators have the machine's kp and output limits and get set values of the same plans; they differ only in
-feedforward. FF1–FF3 are differences of set positions, as in LinuxCNC's component pid, including an error relative to
+All regulators have the machine's feedback (P, with the ki and kd that it has) and output limits, and get set values of
+the same plans; they differ only in feedforward. FF1–FF3 are differences of set positions, as in LinuxCNC's component pid, including an error relative to
 the previous command; its gains are those of P + V + A + J, less what differencing adds, or fitted to the least
 following error. The inverse is the machine file's; without one, that of the simulated drive. Following errors are
 relative to exact set positions. Noise is the rms difference from the run with exact set positions.

@@ -86,7 +86,7 @@ pub fn compare_findings(
     outputs: &Outputs,
     resolutions_um: [f64; 2],
 ) -> Findings {
-    let words = ["The same kp, limits and path for all;", "they differ in feedforward only."];
+    let words = ["The same feedback, limits and path for all;", "they differ in feedforward only."];
     let mut findings = open("Regulators side by side", machine, words, &[]);
     let [over_frequency_um, over_time_um] = resolutions_um.map(|um| figure(um, 3));
     findings.section("Errors over frequency");
