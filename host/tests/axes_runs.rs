@@ -150,7 +150,7 @@ fn replays(recording: &Recording<9>, summary: &RunSummary, rows: &[TraceRow<9>])
     assert_eq!(refused, RecordingError::Places { found: 9, expected: 3 });
     let mut old = bytes;
     old[4] = 3;
-    let expected = "found a recording of format 3, expected format 7";
+    let expected = "found a recording of format 3, expected format 6";
     assert_eq!(recording::places(&old).expect_err("old").to_string(), expected);
     assert_eq!(Recording::<9>::from_bytes(&old).expect_err("old").to_string(), expected);
 }

@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         mm_s_at_10_v: MM_S_AT_10_V,
         output_offset_v: 0.0,
         output_limit_v: 10.0,
-        gains: Gains { kp_per_s: 50.0, ..Gains::default() },
+        gains: Gains { kp_per_s: 50.0, ki_per_s2: 0.0, kd: 0.0 },
         feedforward: Feedforward { velocity: 1.0, ..Feedforward::default() },
         following_error_limit_mm: 0.5,
     };

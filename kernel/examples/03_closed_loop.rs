@@ -45,7 +45,7 @@ fn greatest_error_mm(velocity: f64) -> Result<f64, Box<dyn Error>> {
         mm_s_at_10_v: 10.0 * REFERENCE_MM_S_PER_VOLT,
         output_offset_v: 0.0,
         output_limit_v: 10.0,
-        gains: Gains { kp_per_s: 50.0, ..Gains::default() },
+        gains: Gains { kp_per_s: 50.0, ki_per_s2: 0.0, kd: 0.0 },
         feedforward: Feedforward { velocity, ..Feedforward::default() },
         following_error_limit_mm: 2.0,
     };

@@ -19,7 +19,7 @@ pub(crate) fn figures() -> AxisFigures {
         mm_s_at_10_v: 1000.0 / 3.0,
         output_offset_v: 0.0,
         output_limit_v: 10.0,
-        gains: Gains { kp_per_s: 230.0, ..Gains::default() },
+        gains: Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 },
         feedforward: Feedforward { velocity: 1.0, ..Feedforward::default() },
         following_error_limit_mm: 1.0,
     }

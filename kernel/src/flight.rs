@@ -30,7 +30,7 @@
 //! #     mm_s_at_10_v: 100.0,
 //! #     output_offset_v: 0.0,
 //! #     output_limit_v: 10.0,
-//! #     gains: Gains { kp_per_s: 50.0, ..Gains::default() },
+//! #     gains: Gains { kp_per_s: 50.0, ki_per_s2: 0.0, kd: 0.0 },
 //! #     feedforward: Feedforward::default(),
 //! #     following_error_limit_mm: 0.5,
 //! # };

@@ -38,7 +38,7 @@ fn figures(feedforward: Feedforward) -> AxisFigures {
         mm_s_at_10_v: 20_000.0 / 60.0,
         output_offset_v: 0.0,
         output_limit_v: 10.0,
-        gains: Gains { kp_per_s: 230.0, ..Gains::default() },
+        gains: Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 },
         feedforward,
         following_error_limit_mm: 10.0,
     }

@@ -104,10 +104,10 @@ fn a_fifth_of_any_parameter_may_change() {
             println!("{name} × {by}");
             let machine = changed(&machine, &|drive| change(drive, by));
             let following_um = circle(&machine, 4.0).following_um;
-            assert!(following_um[0] <= 0.5 && following_um[1] <= 1.05, "{name} {by}: {following_um:?}");
+            assert!(following_um[0] <= 0.95 && following_um[1] <= 1.5, "{name} {by}: {following_um:?}");
             for frequency_hz in [10.0, 13.0, 16.0, 19.0, 22.0, 25.0] {
                 let contour_um = circle(&machine, frequency_hz).contour_um();
-                assert!(contour_um <= 14.0, "{name} {by}, {frequency_hz} Hz: {contour_um}");
+                assert!(contour_um <= 11.0, "{name} {by}, {frequency_hz} Hz: {contour_um}");
             }
         }
     }
@@ -120,7 +120,7 @@ fn a_fifth_of_any_parameter_may_change() {
         drive.load_inertia_ratio = 0.2;
     });
     let following_um = circle(&machine, 4.0).following_um;
-    assert!(following_um[0] <= 1.4 && following_um[1] <= 1.7, "{following_um:?}");
+    assert!(following_um[0] <= 2.95 && following_um[1] <= 3.35, "{following_um:?}");
     for frequency_hz in [8.0, 11.0, 16.0, 19.0] {
         let contour_um = circle(&machine, frequency_hz).contour_um();
         assert!(contour_um <= 20.0, "{frequency_hz} Hz: {contour_um}");
@@ -160,30 +160,32 @@ fn a_fifth_of_all_parameters_may_change_at_once() {
     }
     println!("X and Y, friction as known and not: {worst:?}");
     let [known, unknown] = worst.map(|axes| axes.map(|(um, _)| um));
-    assert!(known[0] <= 1.45 && known[1] <= 1.85, "{worst:?}");
-    assert!(unknown[0] <= 1.45 && unknown[1] <= 2.8, "{worst:?}");
+    assert!(known[0] <= 3.15 && known[1] <= 3.7, "{worst:?}");
+    assert!(unknown[0] <= 3.2 && unknown[1] <= 4.7, "{worst:?}");
 }
 
-/// Two integrals would move an axis with friction to and fro for ever. An axis that sticks with up to ten times the friction is
-/// pushed to the count and stays there.
+/// Two integrals would move an axis with friction to and fro for ever, which is why ki stays 0. An axis that sticks with up to ten
+/// times the friction is pushed to the count and stays there.
 #[test]
 fn a_tuned_axis_rests() {
     let (tuned, _) = tuned(&Machine::reference(), Method::Inverse);
     let moves = "G1 X10.00003 Y5.00007 F1000\nG4 P3\nG1 X0.01234 Y0.00321 F50\nG4 P8\n";
-    for (friction, leak) in [(1.0, true), (10.0, true), (1.0, false), (10.0, false)] {
+    for (friction, ki_per_s2) in [(1.0, 0.0), (10.0, 0.0), (1.0, 25_000.0), (10.0, 25_000.0)] {
         let mut machine = changed(&tuned, &|drive| drive.coulomb_friction_mm_s2 *= friction);
-        if !leak {
-            machine.axes.iter_mut().for_each(|axis| axis.gains.ki_leak_per_s = 0.0);
-        }
+        machine.axes.iter_mut().for_each(|axis| axis.gains.ki_per_s2 = ki_per_s2);
         let run = Recording::of("rest".to_owned(), moves, machine, 1.0).expect("a run");
         let rest = &run.ticks[run.ticks.len() - 2000..];
         for axis in 0..2 {
             let span_um = span(rest.iter().map(|tick| tick.axes[axis].err_um));
             let span_v = span(rest.iter().map(|tick| tick.axes[axis].out_v));
-            println!("friction × {friction}, leak {leak}, axis {axis}: {span_um:.2} µm, {span_v:.4} V");
+            println!("friction × {friction}, ki {ki_per_s2}, axis {axis}: {span_um:.2} µm, {span_v:.4} V");
             // A count, and the rounding of its millimetres.
             let rests = span_um <= 0.1 + 1e-6;
-            assert_eq!(rests, leak, "friction × {friction}, axis {axis}: {span_um} µm, {span_v} V");
+            assert_eq!(
+                rests,
+                ki_per_s2 == 0.0,
+                "friction × {friction}, axis {axis}: {span_um} µm, {span_v} V"
+            );
         }
     }
 }

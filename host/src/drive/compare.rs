@@ -368,7 +368,7 @@ fn with_room(machine: &Machine) -> Machine {
     machine
 }
 
-/// The differencing regulator with the machine's gains. Its integral does not leak.
+/// The differencing regulator with the machine's gains.
 fn peer_gains(machine: &Machine) -> [PeerGains; AXES] {
     machine.axes.each_ref().map(|axis| PeerGains {
         p_per_s: axis.gains.kp_per_s,

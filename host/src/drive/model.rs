@@ -103,17 +103,14 @@ pub fn response(drive: &DriveParameters, tick_s: f64, frequency_hz: f64) -> Comp
 /// ticks of `tick_s`.
 ///
 /// ```text
-/// C = kp + ki·Ts/(1 − (1 − λ·Ts)·z⁻¹) + kd·(1 − z⁻¹)/Ts,   z = e^(s·Ts), λ the leak
+/// C = kp + ki·Ts/(1 − z⁻¹) + kd·(1 − z⁻¹)/Ts,   z = e^(s·Ts)
 /// ```
 #[must_use]
 pub fn feedback(gains: &Gains, tick_s: f64, frequency_hz: f64) -> Complex {
     let real = |value: f64| Complex::new(value, 0.0);
     let (sine, cosine) = libm::sincos(-TAU * frequency_hz * tick_s);
-    let before = Complex::new(cosine, sine);
-    let kept = real(1.0 - gains.ki_leak_per_s * tick_s);
-    real(gains.kp_per_s)
-        + real(gains.ki_per_s2 * tick_s) / (real(1.0) - kept * before)
-        + real(gains.kd / tick_s) * (real(1.0) - before)
+    let change = real(1.0) - Complex::new(cosine, sine);
+    real(gains.kp_per_s) + real(gains.ki_per_s2 * tick_s) / change + real(gains.kd / tick_s) * change
 }
 
 /// The frequency at which the linear model's amplitude falls below `ratio` for good \[Hz\], to 0.1 Hz; none

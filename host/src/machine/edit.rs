@@ -156,7 +156,6 @@ fn set_regulator(regulator: &mut Table, edit: &AxisEdit) {
     let AxisEdit { gains, feedforward, .. } = edit;
     set(regulator, "kp_per_s", Some(gains.kp_per_s));
     set(regulator, "ki_per_s2", Some(gains.ki_per_s2));
-    set(regulator, "ki_leak_per_s", (gains.ki_leak_per_s != 0.0).then_some(gains.ki_leak_per_s));
     set(regulator, "kd", Some(gains.kd));
     set(regulator, "feedforward_velocity", Some(feedforward.velocity));
     set(regulator, "feedforward_accel_s", Some(feedforward.accel_s));
@@ -245,7 +244,7 @@ mod tests {
         let bed = BedInverse { frequency_hz: 13.4, damping_ratio: 0.03, mass_ratio: 0.06 };
         for (axis, bed) in machine.axes[..2].iter_mut().zip([None, Some(bed)]) {
             axis.output_offset_v = -0.0125;
-            axis.gains = Gains { kp_per_s: 217.5, ki_per_s2: 9e3, ki_leak_per_s: 72.5, kd: 1e-5 };
+            axis.gains = Gains { kp_per_s: 217.5, ki_per_s2: 0.0, kd: 1e-5 };
             axis.feedforward = Feedforward {
                 velocity: 0.998,
                 lead_s: 1.67e-3,

@@ -100,11 +100,6 @@ pub(super) fn read(source_name: &str, text: &str) -> Result<Machine<AXES_MAX>, M
             return Err(refuse(places.mm_per_count.clone(), expected));
         }
         let &AxisSettings { feedforward: Feedforward { lead_s, drive, .. }, .. } = axis;
-        if let Some(at) = &places.ki_leak_per_s
-            && axis.gains.ki_leak_per_s * tick_s > 1.0
-        {
-            return Err(refuse(at.clone(), format!("at most {}, one over tick_s = {tick_s}", 1.0 / tick_s)));
-        }
         if let Some(at) = &places.lead_s
             && lead_s / tick_s > f64::from(PREVIEW_TICKS_MAX) + LEAD_ROUNDING_TICKS
         {
@@ -246,7 +241,6 @@ struct Places {
     feed_mm_s: Range<usize>,
     offset_v: Range<usize>,
     mm_per_count: Range<usize>,
-    ki_leak_per_s: Option<Range<usize>>,
     lead_s: Option<Range<usize>>,
     inverse_integral_time_s: Option<Range<usize>>,
     inverse_bed_hz: Option<Range<usize>>,
@@ -403,7 +397,6 @@ struct OutputTable {
 struct RegulatorTable {
     kp_per_s: Within<Gain>,
     ki_per_s2: Within<Gain>,
-    ki_leak_per_s: Option<Spanned<Within<Gain>>>,
     kd: Within<Gain>,
     feedforward_velocity: Within<FeedforwardGain>,
     feedforward_accel_s: Within<FeedforwardGain>,
@@ -744,7 +737,6 @@ impl AxisTable {
             take_up_s: backlash.map(|backlash| backlash.take_up_s.span()),
             points_um: error.map(|error| error.points_um.span()),
             homing,
-            ki_leak_per_s: self.regulator.ki_leak_per_s.as_ref().map(Spanned::span),
             lead_s: self.regulator.feedforward_lead_s.as_ref().map(Spanned::span),
             inverse_integral_time_s: inverse.map(|inverse| inverse.integral_time_s.span()),
             inverse_bed_hz: bed.map(|bed| bed.frequency_hz.span()),
@@ -784,7 +776,6 @@ impl AxisTable {
             gains: Gains {
                 kp_per_s: self.regulator.kp_per_s.0,
                 ki_per_s2: self.regulator.ki_per_s2.0,
-                ki_leak_per_s: self.regulator.ki_leak_per_s.map_or(0.0, |leak| leak.into_inner().0),
                 kd: self.regulator.kd.0,
             },
             feedforward: Feedforward {

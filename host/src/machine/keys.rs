@@ -374,14 +374,6 @@ pub const KEY_TABLES: &[KeyTable] = &[
         &[
             Key::new("kp_per_s", "1/s", Gain::EXPECTED, "Proportional gain."),
             Key::new("ki_per_s2", "1/s²", Gain::EXPECTED, "Integral gain."),
-            Key::new(
-                "ki_leak_per_s",
-                "1/s",
-                Gain::EXPECTED,
-                "What the integral forgets, at most one over the tick: an axis with friction comes to rest with 1.25 over \
-                 the drive's integral time.",
-            )
-            .or("0"),
             Key::new("kd", "1", Gain::EXPECTED, "Derivative gain."),
             Key::new(
                 "feedforward_velocity",

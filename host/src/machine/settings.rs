@@ -510,7 +510,7 @@ impl AxisSettings {
             mm_s_at_10_v: 20_000.0 / 60.0,
             output_offset_v: 0.0,
             output_limit_v: 10.0,
-            gains: Gains { kp_per_s: 230.0, ..Gains::default() },
+            gains: Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 },
             // The measured machine ran 0.35 of the drive's own J, 6.376715·10⁻⁵ s².
             feedforward: Feedforward {
                 velocity: 1.0,

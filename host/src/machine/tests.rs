@@ -254,7 +254,6 @@ fn with_optional_keys() -> String {
 fn optional_keys_are_read() {
     let machine = Machine::from_toml("full.toml", &with_optional_keys()).expect("valid");
     let feedforward = machine.axes[0].feedforward;
-    assert!((machine.axes[0].gains.ki_leak_per_s - 45.5).abs() < 1e-12);
     assert!((feedforward.lead_s - 0.00167).abs() < 1e-12);
     let table = feedforward.tables.velocity.expect("a table");
     assert_eq!((table.reach, table.mm_s()[0], table.mm_s()[8]), (300.0, -0.6, 0.6));
@@ -439,7 +438,6 @@ fn defaults_and_only_they_may_be_left_out() {
 fn ranges_of_optional_keys_are_kept() {
     let text = with_optional_keys();
     let cases: &[(&str, &str, &[&str])] = &[
-        ("axis.regulator", "ki_leak_per_s", &["-0.1", "1e10"]),
         ("axis.regulator", "feedforward_lead_s", &["-1e-9", "0.481"]),
         ("axis.regulator.feedforward_velocity_table", "reach", &["0", "-1", "2e12"]),
         (
@@ -515,8 +513,6 @@ fn rules_that_join_optional_keys() {
     assert!(found.is_ok(), "24 ticks: {found:?}");
     let (found, place) = change("axis.regulator", "feedforward_lead_s", "0.01201");
     assert_eq!(found, Err(format!("{place}at most 0.012, 24 ticks of tick_s = 0.0005")));
-    let (found, place) = change("axis.regulator", "ki_leak_per_s", "2000.1");
-    assert_eq!(found, Err(format!("{place}at most 2000, one over tick_s = 0.0005")));
     let (found, place) = change("axis.regulator.inverse", "integral_time_s", "0.0004");
     assert_eq!(found, Err(format!("{place}at least tick_s = 0.0005")));
     let (found, place) = change("axis.regulator.inverse.bed", "frequency_hz", "500");

@@ -54,7 +54,7 @@ const SLIDERS: [Slider; 23] = [
     slider(AXES, "jerk_mm_s3", "Jerk", (100.0, 1e6)),
     slider(AXES, "snap_mm_s4", "Snap", (1e3, 1e9)),
     slider(REGULATOR, "kp_per_s", "Proportional gain", (0.0, 600.0)),
-    slider(REGULATOR, "ki_per_s2", "Integral gain", (0.0, 50_000.0)),
+    slider(REGULATOR, "ki_per_s2", "Integral gain", (0.0, 10_000.0)),
     slider(REGULATOR, "kd", "Derivative gain", (0.0, 2.0)),
     slider(REGULATOR, "feedforward_velocity", "Feedforward of velocity", (0.0, 1.2)),
     slider(REGULATOR, "feedforward_accel_s", "Feedforward of acceleration", (0.0, 0.005)),

@@ -40,7 +40,7 @@ use self::answers::RecordedAnswers;
 use crate::simulate::{Job, Number};
 
 const MAGIC: [u8; 4] = *b"MREC";
-const VERSION: u8 = 7;
+const VERSION: u8 = 6;
 
 /// A recorded run of a machine with `N` places for axes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

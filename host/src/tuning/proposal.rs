@@ -221,7 +221,7 @@ fn changes(
             Some(tuning.gains.kp_per_s),
             "1/s",
             format!(
-                "with ki and kd it leaves least of disturbances, with {PHASE_MIN_DEG}° of phase and a factor {GAIN_MIN} of gain in \
+                "with kd it leaves least of disturbances, with {PHASE_MIN_DEG}° of phase and a factor {GAIN_MIN} of gain in \
                  hand: crossover {:.1} Hz, phase margin {:.1}°, gain margin {:.2}, errors magnified at most {:.2} times",
                 margins.crossover_hz, margins.phase_deg, margins.gain, margins.sensitivity
             ),
@@ -229,29 +229,11 @@ fn changes(
         change(
             "regulator.ki_per_s2",
             Some(axis.gains.ki_per_s2),
-            Some(gains.ki_per_s2),
+            Some(0.0),
             "1/s²",
-            if gains.ki_per_s2 > 0.0 {
-                format!(
-                    "takes off what the feedforward lacks of friction and inertia, as much as kp within {:.0} ms",
-                    1e3 * gains.kp_per_s / gains.ki_per_s2
-                )
-            } else {
-                "kp leaves less of disturbances without it".to_owned()
-            },
-        ),
-        change(
-            "regulator.ki_leak_per_s",
-            (axis.gains.ki_leak_per_s != 0.0).then_some(axis.gains.ki_leak_per_s),
-            (gains.ki_leak_per_s != 0.0).then_some(gains.ki_leak_per_s),
-            "1/s",
-            if gains.ki_leak_per_s > 0.0 {
-                "a quarter above the rate at which the drive integrates: two integrals would not let an axis with friction \
-                 rest"
-            } else {
-                "it goes with ki"
-            }
-            .to_owned(),
+            "the drive's own controller integrates, and two integrals would not let an axis with friction rest; drift is \
+             trimmed by offset_v"
+                .to_owned(),
         ),
         change(
             "regulator.kd",

@@ -9,10 +9,6 @@
 //! time, so they keep their meaning when the tick changes; [`AxesConfig`](super::AxesConfig) turns them into
 //! per-tick factors.
 //!
-//! **Leak**: an axis that sticks by friction, moved by two integrals, this one and its drive's, never comes to rest. It breaks free,
-//! goes too far, sticks, and is pushed back. An integral that forgets as fast as the drive integrates lets the axis rest, and still
-//! does most of its work in motion. Without a leak the equation is S4's.
-//!
 //! **Anti-windup**: while the output is at its limit, the sum takes no error that would drive the
 //! output farther out.
 
@@ -30,8 +26,6 @@ pub struct Gains {
     pub kp_per_s: f64,
     /// Integral \[1/s²\]: ki of S4 (1) is this times the tick.
     pub ki_per_s2: f64,
-    /// What the integral forgets \[1/s\], 0 to one over the tick: per tick this times the tick of its sum.
-    pub ki_leak_per_s: f64,
     /// Derivative \[1\]: kd of S4 (1) is this divided by the tick.
     pub kd: f64,
 }
@@ -41,8 +35,6 @@ pub struct Gains {
 pub(crate) struct Regulator<R> {
     kp: R,
     ki: R,
-    /// What is left of the integral after a tick.
-    kept: R,
     kd: R,
     feedforward: FeedforwardConfig<R>,
 }
@@ -86,8 +78,8 @@ impl<R: Real> Regulator<R> {
     /// The regulator for a control tick of `tick_s`, position set-points delayed by `preview_ticks`, and
     /// following errors up to `error_limit_mm`, beyond which the axis faults.
     ///
-    /// Refused if a gain or the tick is not finite, kp, ki or kd is negative, the leak forgets more than the sum in
-    /// a tick, the tick is not positive, or a gain at the error limit or feedforward is beyond the number type's range.
+    /// Refused if a gain or the tick is not finite, kp, ki or kd is negative, the tick is not positive, or a
+    /// gain at the error limit or feedforward is beyond the number type's range.
     pub(super) fn new(
         check: &mut Check,
         gains: Gains,
@@ -100,7 +92,6 @@ impl<R: Real> Regulator<R> {
         Self {
             kp: gain(check, "kp [1/s]", gains.kp_per_s, error_limit_mm),
             ki: gain(check, "ki [1/s²]", gains.ki_per_s2 * tick_s, error_limit_mm),
-            kept: R::from_f64(1.0 - leak(check, gains.ki_leak_per_s, tick_s)),
             kd: gain(check, "kd [1]", gains.kd / tick_s, 2.0 * error_limit_mm),
             feedforward: FeedforwardConfig::checked(check, feedforward, preview_ticks, tick_s),
         }
@@ -118,8 +109,7 @@ impl<R: Real> Regulator<R> {
         let change_mm = error_mm - state.last_error_mm;
         state.last_error_mm = error_mm;
         let feedforward = self.feedforward.tick(&mut state.feedforward, setpoint) + state.correction_mm_s;
-        let kept_mm_s = state.integral_mm_s * self.kept;
-        let integral_mm_s = kept_mm_s + self.ki * error_mm;
+        let integral_mm_s = state.integral_mm_s + self.ki * error_mm;
         let wanted = feedforward + self.kp * error_mm + self.kd * change_mm + integral_mm_s;
         let (least, greatest) = limits;
         let (velocity_mm_s, saturated, winding_up) = if wanted > greatest {
@@ -129,7 +119,9 @@ impl<R: Real> Regulator<R> {
         } else {
             (wanted, false, false)
         };
-        state.integral_mm_s = if winding_up { kept_mm_s } else { integral_mm_s };
+        if !winding_up {
+            state.integral_mm_s = integral_mm_s;
+        }
         Command { velocity_mm_s, saturated }
     }
 }
@@ -141,18 +133,6 @@ fn gain<R: Real>(check: &mut Check, quantity: &'static str, value: f64, per_mm: 
     let fits = is_within(value, 0.0, f64::MAX) && fits::<R>(value) && fits::<R>(8.0 * value * per_mm);
     check.that(fits, quantity, value, "a number within the kernel's range, not below 0");
     R::from_f64(value)
-}
-
-/// The part that the integral forgets in a tick.
-fn leak(check: &mut Check, leak_per_s: f64, tick_s: f64) -> f64 {
-    let part = leak_per_s * tick_s;
-    check.that(
-        is_within(part, 0.0, 1.0),
-        "ki leak [1/s]",
-        leak_per_s,
-        "a number from 0 to one over the tick",
-    );
-    part
 }
 
 #[cfg(test)]
@@ -180,7 +160,7 @@ mod tests {
     /// S4 (1) written out, on a random sequence of errors and set-points.
     #[test]
     fn is_the_papers_equation() {
-        let gains = Gains { kp_per_s: 230.0, ki_per_s2: 900.0, kd: 0.003, ..Gains::default() };
+        let gains = Gains { kp_per_s: 230.0, ki_per_s2: 900.0, kd: 0.003 };
         let feedforward =
             Feedforward { velocity: 1.0, accel_s: 1.675e-3, jerk_s2: 2.2e-5, ..Feedforward::default() };
         let regulator = regulator(gains, feedforward);
@@ -209,27 +189,6 @@ mod tests {
         }
     }
 
-    /// The sum of a constant error ends where as much is forgotten as comes, and is forgotten when the error goes.
-    #[test]
-    fn the_integral_leaks() {
-        let gains = Gains { ki_per_s2: 900.0, ki_leak_per_s: 20.0, ..Gains::default() };
-        let regulator = regulator(gains, Feedforward::default());
-        let mut state = RegulatorState::default();
-        let still = Setpoint::default();
-        let after = |state: &mut RegulatorState<f64>, error_mm, time_s: f64| {
-            let ticks = (time_s / TICK_S) as u32;
-            (0..ticks)
-                .map(|_| regulator.tick(state, error_mm, &still, WIDE).velocity_mm_s)
-                .last()
-                .expect("ticks")
-        };
-        let end_mm_s = 0.1 * gains.ki_per_s2 / gains.ki_leak_per_s;
-        assert!((after(&mut state, 0.1, 2.0) - end_mm_s).abs() < 1e-9);
-        // Half a time constant: e^(−½), by steps of a hundredth of it.
-        let left = after(&mut state, 0.0, 0.025) / end_mm_s;
-        assert!((left - 0.99_f64.powi(50)).abs() < 1e-9 && (left - 0.606_531).abs() < 2e-3, "{left}");
-    }
-
     #[test]
     fn gains_of_zero_open_the_loop() {
         let open = regulator(Gains::default(), Feedforward { velocity: 1.0, ..Feedforward::default() });
@@ -244,8 +203,7 @@ mod tests {
     /// After a long saturation the output must come back as soon as the error changes sign.
     #[test]
     fn the_sum_does_not_wind_up() {
-        let regulator =
-            regulator(Gains { kp_per_s: 10.0, ki_per_s2: 1e4, ..Gains::default() }, Feedforward::default());
+        let regulator = regulator(Gains { kp_per_s: 10.0, ki_per_s2: 1e4, kd: 0.0 }, Feedforward::default());
         let mut state = RegulatorState::default();
         let still = Setpoint::default();
         for _ in 0..100_000 {
@@ -261,10 +219,6 @@ mod tests {
         let gains = Gains { kp_per_s: f64::NAN, ..Gains::default() };
         assert!(new::<f32>(gains, Feedforward::default(), TICK_S, 1.0).is_err());
         assert!(new::<f32>(Gains::default(), Feedforward::default(), 0.0, 1.0).is_err());
-        for (leak_per_s, is_accepted) in [(0.0, true), (2000.0, true), (2001.0, false), (-1.0, false)] {
-            let gains = Gains { ki_leak_per_s: leak_per_s, ..Gains::default() };
-            assert_eq!(new::<f32>(gains, Feedforward::default(), TICK_S, 1.0).is_ok(), is_accepted);
-        }
         // 8·10⁷·100 mm/s do not fit 32.32 bits.
         let strong = Gains { kp_per_s: 1e7, ..Gains::default() };
         assert!(new::<crate::num::Fixed>(strong, Feedforward::default(), TICK_S, 220.0).is_err());

@@ -3,10 +3,10 @@
 //! | bytes | content |
 //! |---|---|
 //! | 4 | `MOTN` |
-//! | 1 | version of this format: 8, or 9 of a machine with compensation |
+//! | 1 | version of this format: 6, or 7 of a machine with compensation |
 //! | 1 | number of axes |
 //! | 2 | length of guards, homing and compensation together, least significant byte first; 0 for none |
-//! | … | [`Guards`] in the [postcard](https://postcard.jamesmunns.com) wire format, and behind them, if any axis is homed or compensated, `HomingFigures`; a kernel without guards skips both. Behind them, in format 9, `Compensation`; a kernel without compensation does not read that format |
+//! | … | [`Guards`] in the [postcard](https://postcard.jamesmunns.com) wire format, and behind them, if any axis is homed or compensated, `HomingFigures`; a kernel without guards skips both. Behind them, in format 7, `Compensation`; a kernel without compensation does not read that format |
 //! | … | [`Header`], in the same format |
 //! | … | [`Item`]s to the end, each [as few bytes](super::compact) |
 //! | 4 | CRC-32 (ISO-HDLC, the one of zip and Ethernet) of all before it, least significant byte first |
@@ -31,9 +31,9 @@ use crate::units::Position;
 
 const MAGIC: [u8; 4] = *b"MOTN";
 /// The version of this format, and of the items in it.
-pub const FORMAT: u8 = 8;
+pub const FORMAT: u8 = 6;
 /// The version of a program of a machine with compensation: a kernel that has none would drive it wrong.
-const FORMAT_COMPENSATED: u8 = 9;
+const FORMAT_COMPENSATED: u8 = 7;
 const PREFIX: usize = MAGIC.len() + 2;
 /// Axes of the largest machine.
 const AXES_MAX: usize = 9;
@@ -67,7 +67,7 @@ pub enum ProgramError {
     NotAProgram,
     /// It has another version of the format.
     Version {
-        /// Its version; 8 is expected, or 9 by a kernel with compensation.
+        /// Its version; 6 is expected, or 7 by a kernel with compensation.
         found: u8,
     },
     /// It is for a machine with another number of axes.

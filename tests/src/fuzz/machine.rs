@@ -38,7 +38,7 @@ pub(super) fn axes<R: Real>() -> AxesConfig<R, 2> {
         mm_s_at_10_v: 500.0,
         output_offset_v: TRIM_V,
         output_limit_v: 9.0,
-        gains: Gains { kp_per_s: 100.0, ki_per_s2: 10.0, ki_leak_per_s: 5.0, kd: 0.001 },
+        gains: Gains { kp_per_s: 100.0, ki_per_s2: 10.0, kd: 0.001 },
         feedforward: Feedforward { velocity: 1.0, accel_s: 1e-3, jerk_s2: 1e-6, ..Feedforward::default() },
         following_error_limit_mm: 1.0,
     };

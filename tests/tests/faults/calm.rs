@@ -14,7 +14,7 @@ fn tuned() -> Machine {
     let mut machine = Machine::reference();
     for axis in &mut machine.axes {
         let drive = axis.drive;
-        axis.gains = Gains { kp_per_s: 120.0, ..Gains::default() };
+        axis.gains = Gains { kp_per_s: 120.0, ki_per_s2: 0.0, kd: 0.0 };
         axis.feedforward = Feedforward {
             velocity: 1.0,
             lead_s: drive.dead_time_s + machine.tick_s / 2.0,

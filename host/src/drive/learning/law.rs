@@ -268,7 +268,7 @@ fn faded(signal: &[f64], length: usize) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    const GAINS: Gains = Gains { kp_per_s: 230.0, ki_per_s2: 0.0, ki_leak_per_s: 0.0, kd: 0.0 };
+    const GAINS: Gains = Gains { kp_per_s: 230.0, ki_per_s2: 0.0, kd: 0.0 };
 
     fn reference(drive: &DriveParameters) -> Loop<'_> {
         Loop { drive, command_gain: 1.0, gains: GAINS, tick_s: 5e-4, knot_ticks: 4 }
