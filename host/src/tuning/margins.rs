@@ -223,7 +223,7 @@ mod tests {
             };
             let found = Margins::of(&drive, p(118.0), 5e-4);
             println!("{found:?}");
-            assert!((found.gain - gain).abs() < 1e-3, "{found:?}");
+            assert!((found.gain - gain).abs() < 3e-3, "{found:?}");
         }
     }
 }
