@@ -664,7 +664,13 @@ fn a_boards_flight_recorder_is_read() {
         }
         assert!(begin.elapsed() < LONGEST);
     };
-    assert_eq!(rows.len(), 64);
+    // All that it keeps, or all since the board began.
+    assert!(
+        rows.len() == 64 || rows.len() > 17 && rows[0].tick <= 1,
+        "{} from tick {}",
+        rows.len(),
+        rows[0].tick
+    );
     assert!(rows.windows(2).all(|pair| pair[1].tick == pair[0].tick + 1));
     assert_eq!(rows.iter().filter(|row| row.is_faulted).count(), 17);
 }
