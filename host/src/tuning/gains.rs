@@ -97,8 +97,7 @@ fn greatest(plant: &Plant, shape: Gains, factor_max: f64) -> Option<f64> {
     for point in plant.opened(shape) {
         if let Some(before) = before {
             if is_late(&point) || is_late(&before) {
-                let factors = [before, point].map(|point| 1.0 / point.magnitude);
-                let [first, second] = factors;
+                let [first, second] = [before, point].map(|point| 1.0 / point.magnitude);
                 forbidden.push((first.min(second) / GAIN_SPREAD, first.max(second) * GAIN_SPREAD));
             }
             if point.turns_over(&before) {

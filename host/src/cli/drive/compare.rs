@@ -26,10 +26,11 @@ const RESOLUTIONS_MAX: usize = 10;
 
 const HELP: &str = "\
 All regulators have the machine's feedback (P, with the ki and kd that it has) and output limits, and get set values of
-the same plans; they differ only in feedforward. FF1–FF3 are differences of set positions, as in LinuxCNC's component pid, including an error relative to
-the previous command; its gains are those of P + V + A + J, less what differencing adds, or fitted to the least
-following error. The inverse is the machine file's; without one, that of the simulated drive. Following errors are
-relative to exact set positions. Noise is the rms difference from the run with exact set positions.
+the same plans; they differ only in feedforward. FF1–FF3 are differences of set positions, as in LinuxCNC's component
+pid, including an error relative to the previous command; its gains are those of P + V + A + J, less what differencing
+adds, or fitted to the least following error. The inverse is the machine file's; without one, that of the simulated
+drive. Following errors are relative to exact set positions. Noise is the rms difference from the run with exact set
+positions.
 
 JSON: feed_mm_min, motions, fitted (of each axis: ff1, ff2_s, ff3_s2), regulators: list of {name, set_resolution_um
 (0: exact), motions: list of {following_error_um, contour_error_um, output_noise_mv, current_noise_percent}},
