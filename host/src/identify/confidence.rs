@@ -2,7 +2,8 @@
 //!
 //! The covariance of the unknowns, in the search's coordinates, is the inverse of the information of all runs.
 //! Residuals that resemble their neighbours tell less: n of them as little as n/γ independent ones, with γ one
-//! plus twice the sum of their autocorrelation.
+//! plus twice the sum of their autocorrelation. Where an axis moves by part of a count from tick to tick, a rounding error is made
+//! good by the next ones, and readings tell more than independent ones: γ is less than one.
 //!
 //! Where the model does not follow, what is left of the recordings may be the work of anything. An unknown moves by
 //! at most √left standard deviations for a remainder of `left` (Cauchy and Schwarz), and intervals become as much
@@ -24,6 +25,12 @@ use crate::chance::Chance;
 
 /// Lags over which autocorrelation is summed at most.
 const LAGS_MAX: usize = 400;
+
+/// Readings over which errors are summed: half a period of the fastest motion that identification asks for.
+const SUMMED: usize = 11;
+
+/// The least of their scatter that is believed: it is an estimate, and slower motions sum over more of them.
+const SCATTER_MIN: f64 = 0.3;
 
 /// γ from which a run's residuals are not white.
 const NOT_WHITE: f64 = 1.35;
@@ -52,6 +59,22 @@ fn correlation_factor(residuals: &[f64]) -> f64 {
     1.0 + 2.0 * correlations.take_while(|&correlation| correlation > 0.0).sum::<f64>()
 }
 
+/// The variance of sums of some [`SUMMED`] residuals over that of independent ones. Rounding errors of an axis that moves by part of
+/// a count from tick to tick run through the count, and their sums hardly grow.
+fn scatter_of_sums(whitened: &[Vec<f64>]) -> f64 {
+    let power: f64 = whitened.iter().map(|run| dot(run, run)).sum();
+    if !(power > 0.0) {
+        return 1.0;
+    }
+    let correlation = |lag: usize| {
+        let of_run = |run: &Vec<f64>| run.get(lag..).map_or(0.0, |later| dot(later, run));
+        whitened.iter().map(of_run).sum::<f64>() / power
+    };
+    // Weights of Bartlett: a variance is never negative.
+    let share = |lag: usize| 1.0 - lag as f64 / SUMMED as f64;
+    1.0 + 2.0 * (1..SUMMED).map(|lag| share(lag) * correlation(lag)).sum::<f64>()
+}
+
 /// What else recordings allow than what was found.
 #[derive(Clone, Debug)]
 pub(super) struct Confidence {
@@ -63,19 +86,14 @@ pub(super) struct Confidence {
 
 /// The confidence of what a search over the `free` unknowns found, with weights that are up to date; `None` if it
 /// can't be linearised.
-pub(super) fn confidence(
-    runs: &mut Runs,
-    found: &Found,
-    free: &[Unknown],
-    substeps: u32,
-    left: f64,
-) -> Option<Confidence> {
+pub(super) fn confidence(runs: &mut Runs, found: &Found, free: &[Unknown], left: f64) -> Option<Confidence> {
     let whitened = runs.weights(Precision::LAST).whitened(&found.residuals);
     let factors: Vec<f64> = whitened.iter().map(|run| correlation_factor(run)).collect();
     // A remainder that counts as a whole counts once.
     let not_white = if left > 0.0 { f64::INFINITY } else { NOT_WHITE };
+    let told_more = scatter_of_sums(&whitened).clamp(SCATTER_MIN, 1.0);
     let counted: Vec<f64> =
-        factors.iter().map(|&factor| if factor > not_white { factor } else { 1.0 }).collect();
+        factors.iter().map(|&factor| if factor > not_white { factor } else { told_more }).collect();
     runs.inflate(&counted);
     let weights = runs.weights(Precision::LAST);
     let lag_limit_s = runs.lag_limit_s();
@@ -83,10 +101,10 @@ pub(super) fn confidence(
     let mut samples = Vec::new();
     let mut least_misfit = f64::INFINITY;
     for centre in [found.unknowns].iter().chain(&found.rivals) {
-        let (mut columns, residuals) = derivatives(runs, centre, free, substeps)?;
+        let (mut columns, residuals) = derivatives(runs, centre, free, Precision::LAST)?;
         let misfit: f64 = weights.misfits(&residuals).iter().sum();
         least_misfit = least_misfit.min(misfit);
-        widen(runs, &weights, centre, free, substeps, &mut columns, &residuals);
+        widen(runs, &weights, centre, free, &mut columns, &residuals);
         let mut information = weights.sums(&columns, &residuals).normal;
         for (index, unknown) in free.iter().enumerate() {
             // An unknown that no run shows ends with this width, far beyond what counts as determined.
@@ -111,8 +129,8 @@ pub(super) fn confidence(
 
 /// One standard deviation along the direction that the recordings fix worst, in the coordinates of the `free`
 /// unknowns.
-pub(super) fn floor(runs: &Runs, found: &Found, free: &[Unknown], substeps: u32) -> Option<Vec<f64>> {
-    let (columns, residuals) = derivatives(runs, &found.unknowns, free, substeps)?;
+pub(super) fn floor(runs: &Runs, found: &Found, free: &[Unknown]) -> Option<Vec<f64>> {
+    let (columns, residuals) = derivatives(runs, &found.unknowns, free, Precision::LAST)?;
     let information = runs.weights(Precision::LAST).sums(&columns, &residuals).normal;
     Some(weakest(&Shown::of(information, free), &[])?.0)
 }
@@ -170,7 +188,6 @@ fn widen(
     weights: &Weights,
     centre: &Unknowns,
     free: &[Unknown],
-    substeps: u32,
     columns: &mut [Residuals],
     still: &Residuals,
 ) {
@@ -179,7 +196,7 @@ fn widen(
         for round in 1..=WIDE_ROUNDS {
             let shown = Shown::of(weights.sums(columns, still).normal, free);
             let Some((step, direction)) = weakest(&shown, &known) else { return };
-            let wide = wide_change(runs, centre, free, substeps, &step, still);
+            let wide = wide_change(runs, centre, free, &step, still);
             let is_less =
                 |change: &Residuals| weights.misfits(change).iter().sum::<f64>() < PROMISED * PROMISED;
             let Some(mut change) = wide.filter(is_less) else {
@@ -207,7 +224,6 @@ fn wide_change(
     runs: &Runs,
     centre: &Unknowns,
     free: &[Unknown],
-    substeps: u32,
     step: &[f64],
     still: &Residuals,
 ) -> Option<Residuals> {
@@ -219,7 +235,7 @@ fn wide_change(
     };
     let sides = [side(1.0), side(-1.0)];
     let sets: Vec<Unknowns> = sides.iter().flatten().copied().collect();
-    let mut found = runs.residuals(&sets, substeps).into_iter();
+    let mut found = runs.residuals(&sets, Precision::LAST.substeps).into_iter();
     let mut of = |side: Option<Unknowns>| match side {
         Some(_) => found.next()?,
         None => Some(still.clone()),
@@ -283,6 +299,24 @@ mod tests {
         assert!((1.0..1.3).contains(&correlation_factor(&alone)));
         assert!((8.0..13.0).contains(&correlation_factor(&standing)));
         assert_eq!(correlation_factor(&[0.0; 10]), 1.0);
+    }
+
+    /// Readings of a steady motion, rounded to counts, and errors of no order.
+    #[test]
+    fn rounding_errors_make_each_other_good() {
+        let rounded = |counts_per_tick: f64| -> Vec<f64> {
+            let positions = (0..4000).map(|tick| counts_per_tick * f64::from(tick));
+            positions.map(|position| position.round() - position).collect()
+        };
+        for counts_per_tick in [0.382, 3.236, 7.41] {
+            let scatter = scatter_of_sums(&[rounded(counts_per_tick)]);
+            assert!((0.0..0.4).contains(&scatter), "{counts_per_tick}: {scatter}");
+        }
+        let mut chance = Chance(3);
+        let noise: Vec<f64> = (0..20_000).map(|_| chance.normal()).collect();
+        let scatter = scatter_of_sums(&[noise]);
+        assert!((0.9..1.1).contains(&scatter), "{scatter}");
+        assert_eq!(scatter_of_sums(&[Vec::new(), vec![0.0; 5]]), 1.0);
     }
 
     #[test]

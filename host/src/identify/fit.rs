@@ -51,6 +51,8 @@ const ROUGH_EFFORT: Effort =
     Effort { precision: Precision { substeps: 5, slack: 2e-3 }, jacobians: 12, least_gain: 1.0 };
 const MIDDLE_EFFORT: Effort =
     Effort { precision: Precision { substeps: 10, slack: 2e-4 }, jacobians: 12, least_gain: 1.0 };
+/// Of each of several beds, before the best of them is followed.
+const BEGUN_EFFORT: Effort = Effort { jacobians: 4, ..MIDDLE_EFFORT };
 const FINE_EFFORT: Effort =
     Effort { precision: Precision { substeps: SUBSTEPS, slack: 5e-5 }, jacobians: 6, least_gain: 1.0 };
 const LAST_EFFORT: Effort = Effort { precision: Precision::LAST, jacobians: 25, least_gain: 0.02 };
@@ -81,6 +83,9 @@ const OTHERS: usize = 2;
 /// A bed must lower the misfit by what its three unknowns are worth by themselves, three logarithms of the number of
 /// readings (Schwarz), and by as much again as chance does in one of e¹⁵ cases.
 const BED_GAIN: f64 = 30.0;
+
+/// Difference in misfit below which finishing what was found may decide between a bed and none.
+const UNDECIDED: f64 = 1e3;
 
 /// Two searches for one minimum end this far apart: positions are stairs where the limit acts, if low ones.
 const STAIRS: f64 = 10.0;
@@ -128,16 +133,21 @@ impl Stages {
     /// The last two stages.
     fn last(&self, start: Unknowns, free: &[Unknown]) -> Option<Found> {
         let fine = self.stage(start, free, FINE_EFFORT)?;
-        let found = search(&self.runs, fine.unknowns, free, LAST_EFFORT)?;
+        search(&self.runs, fine.unknowns, free, LAST_EFFORT)
+    }
+
+    /// What was found by the last stages, or better if there is better near it; with its rivals.
+    fn finished(&self, found: Found, free: &[Unknown]) -> Option<Found> {
         if found.misfit() > LOST * self.readings() {
             return Some(found);
         }
         self.kicked(self.with_rivals(found, free)?, free)
     }
 
-    /// What was found, or better if the search had stopped on its way along the floor of a valley.
+    /// What was found, or better if the search had stopped on its way along the floor of a valley. Ends beside it that are hardly
+    /// worse are rivals: the floor has stairs where the limit acts.
     fn kicked(&self, found: Found, free: &[Unknown]) -> Option<Found> {
-        let floor = floor(&self.runs, &found, free, SUBSTEPS)?;
+        let floor = floor(&self.runs, &found, free)?;
         let lag_limit_s = self.runs.lag_limit_s();
         let start = |deviations: &f64| {
             let steps = free.iter().zip(&floor);
@@ -145,14 +155,19 @@ impl Stages {
                 .fold(found.unknowns, |start, (&unknown, step)| start.shifted(unknown, deviations * step));
             moved.bounded(free, lag_limit_s)
         };
-        let near = KICKS.iter().filter_map(|by| search(&self.runs, start(by), free, KICKED_EFFORT));
-        match least(near).filter(|near| near.misfit() < found.misfit() - KICK_GAIN) {
-            Some(near) => {
-                let last = search(&self.runs, near.unknowns, free, LAST_EFFORT)?;
-                Some(Found { rivals: found.rivals, ..last })
-            }
-            None => Some(found),
-        }
+        let near: Vec<Found> = KICKS
+            .iter()
+            .filter_map(|by| search(&self.runs, start(by), free, KICKED_EFFORT))
+            .filter(|near| near.misfit() < found.misfit() + RIVAL)
+            .collect();
+        let beside: Vec<Unknowns> =
+            found.rivals.iter().copied().chain(near.iter().map(|near| near.unknowns)).collect();
+        let better = least(near.into_iter()).filter(|near| near.misfit() < found.misfit() - KICK_GAIN);
+        let best = match better {
+            Some(near) => search(&self.runs, near.unknowns, free, LAST_EFFORT)?,
+            None => found,
+        };
+        Some(Found { rivals: beside, ..best })
     }
 
     /// The least of what was found and of the valleys that answer alike; those that are hardly worse are its rivals.
@@ -179,16 +194,16 @@ impl Stages {
         let middle = self.stage(rough.unknowns, without_bed(), MIDDLE_EFFORT)?;
         let is_rigid = middle.misfit() < MET * self.readings();
         let model = if is_rigid { self.rigid_first(&middle) } else { self.bed_first(&middle) }?;
-        if self.is_met(&model) {
+        if self.is_met(&model.0) {
             return Some(model);
         }
         match self.other_beds(starts) {
             Some(other) if other.misfit() < model.0.misfit() => Some((other, &ALL)),
-            _ => Some(model),
+            _ => Some((self.finished(model.0, model.1)?, model.1)),
         }
     }
 
-    fn is_met(&self, (found, _): &Model) -> bool {
+    fn is_met(&self, found: &Found) -> bool {
         found.misfit() < MET * self.readings()
     }
 
@@ -201,11 +216,12 @@ impl Stages {
     /// Where the rigid model follows in the middle: a bed, if its remainder promises one.
     fn rigid_first(&mut self, middle: &Found) -> Option<Model> {
         self.runs.regroup(&middle.unknowns, SUBSTEPS);
-        let rigid = self.last(middle.unknowns, without_bed())?;
+        let rigid = self.finished(self.last(middle.unknowns, without_bed())?, without_bed())?;
         let starts = likely_beds(&self.runs, &rigid, Precision::LAST);
         // What is promised is linear; a search may find more.
         let promising = starts.into_iter().take(BEDS).filter(|(_, gain)| *gain > PROMISE);
-        let bed = least(promising.filter_map(|(start, _)| search(&self.runs, start, &ALL, LAST_EFFORT)));
+        let begun = promising.filter_map(|(start, _)| search(&self.runs, start, &ALL, EXCHANGED_EFFORT));
+        let bed = least(begun).and_then(|begun| search(&self.runs, begun.unknowns, &ALL, LAST_EFFORT));
         Some(match bed.and_then(|bed| self.with_rivals(bed, &ALL)) {
             Some(bed) if self.is_bed(&rigid, &bed) => (bed, &ALL),
             _ => (rigid, without_bed()),
@@ -215,24 +231,37 @@ impl Stages {
     /// Where it does not: beds first.
     fn bed_first(&mut self, middle: &Found) -> Option<Model> {
         let starts = likely_beds(&self.runs, middle, MIDDLE_EFFORT.precision);
-        let followed = starts.into_iter().take(BEDS);
-        let Some(bed) = least(followed.filter_map(|(start, _)| self.stage(start, &ALL, MIDDLE_EFFORT)))
-        else {
-            return self.rigid_first(middle);
-        };
+        let begun =
+            starts.into_iter().take(BEDS).filter_map(|(start, _)| self.stage(start, &ALL, BEGUN_EFFORT));
+        let bed = least(begun).and_then(|begun| search(&self.runs, begun.unknowns, &ALL, MIDDLE_EFFORT));
+        let Some(bed) = bed else { return self.rigid_first(middle) };
         self.runs.regroup(&bed.unknowns, SUBSTEPS);
         let bed = self.last(bed.unknowns, &ALL)?;
         let mut start = bed.unknowns;
         start.set(Unknown::BedMassRatio, 0.0);
         let beside = search(&self.runs, start, without_bed(), EXCHANGED_EFFORT);
         let beside = beside.filter(|beside| beside.misfit() < bed.misfit() + NEAR);
-        let is_met = bed.misfit() < MET * self.readings();
-        if is_met && bed.unknowns.get(Unknown::BedMassRatio) > CERTAIN_RATIO && beside.is_none() {
+        if self.is_met(&bed) && bed.unknowns.get(Unknown::BedMassRatio) > CERTAIN_RATIO && beside.is_none() {
             // The rigid model misses it by far, wherever it starts.
-            return Some((bed, &ALL));
+            return Some((self.finished(bed, &ALL)?, &ALL));
         }
         let beside = beside.and_then(|near| search(&self.runs, near.unknowns, without_bed(), LAST_EFFORT));
         let rigid = least([self.last(middle.unknowns, without_bed()), beside].into_iter().flatten())?;
+        self.decided(rigid, bed)
+    }
+
+    /// With a bed or without. What is far behind, or far from the recordings, is not finished.
+    fn decided(&self, mut rigid: Found, mut bed: Found) -> Option<Model> {
+        if !self.is_met(&rigid) && !self.is_met(&bed) {
+            return Some(if bed.misfit() < rigid.misfit() { (bed, &ALL) } else { (rigid, without_bed()) });
+        }
+        let is_near = (rigid.misfit() - bed.misfit()).abs() < UNDECIDED;
+        if is_near || !self.is_bed(&rigid, &bed) {
+            rigid = self.finished(rigid, without_bed())?;
+        }
+        if is_near || self.is_bed(&rigid, &bed) {
+            bed = self.finished(bed, &ALL)?;
+        }
         Some(if self.is_bed(&rigid, &bed) { (bed, &ALL) } else { (rigid, without_bed()) })
     }
 
@@ -256,7 +285,7 @@ impl Stages {
         });
         let middle = least(followed)?;
         self.runs.regroup(&middle.unknowns, SUBSTEPS);
-        self.last(middle.unknowns, &ALL)
+        self.finished(self.last(middle.unknowns, &ALL)?, &ALL)
     }
 }
 
@@ -307,7 +336,7 @@ fn settled(
         Err(error) => return Some(Err(error)),
     };
     let left = if is_met { 0.0 } else { misfit - readings };
-    let confidence = confidence(&mut runs, &found, free, SUBSTEPS, left)?;
+    let confidence = confidence(&mut runs, &found, free, left)?;
     let tick_s = recordings[0].tick_s;
     Some(Ok(Fit {
         parameters: estimates(&confidence, &found, tick_s),

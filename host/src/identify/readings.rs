@@ -304,7 +304,9 @@ impl Runs {
                 if tick >= run.starts[group + 1] {
                     group += 1;
                 }
-                sums[group].iter_mut().zip(at).for_each(|(sum, position)| *sum += position);
+                for lane in 0..LANES {
+                    sums[group][lane] += at[lane];
+                }
             });
             for (lane, residuals) in all.iter_mut().enumerate() {
                 let of_group = |group: usize| {

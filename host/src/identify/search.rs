@@ -43,37 +43,50 @@ pub(super) struct Effort {
 
 /// Dampings that are tried at once, over the last that was good.
 const DAMPINGS: [f64; LANES] = [0.01, 1.0, 30.0, 1e3];
-/// A search also ends where it gains less than this part of the misfit: far from the readings the last digits tell nothing.
-const LEAST_PART: f64 = 1e-6;
+/// A search also ends where it gains less than this part of the misfit beyond what readings leave: far from them the last digits
+/// tell nothing.
+const LEAST_PART: f64 = 3e-4;
 /// Steps with one Jacobian ...
 const STEPS_PER_JACOBIAN: usize = 5;
 /// ... while each gains this part of the misfit.
 const SAME_JACOBIAN: f64 = 2e-3;
 
-/// The model's derivatives about `unknowns`, as residuals by free unknown, and the residuals there.
+/// The model's derivatives about `unknowns`, as residuals by free unknown, and the residuals there. Where there is slack, from
+/// one side: half of the simulations.
 pub(super) fn derivatives(
     runs: &Runs,
     unknowns: &Unknowns,
     free: &[Unknown],
-    substeps: u32,
+    precision: Precision,
 ) -> Option<(Vec<Residuals>, Residuals)> {
     let lag_limit_s = runs.lag_limit_s();
-    let mut sets = vec![*unknowns];
-    for &unknown in free {
-        for step in [unknown.difference(), -unknown.difference()] {
-            // Not across a bound.
-            let is_held = unknowns.is_held(unknown, step, lag_limit_s);
-            let moved = if is_held { *unknowns } else { unknowns.shifted(unknown, step) };
-            sets.push(moved.bounded(&[unknown], lag_limit_s));
+    let neighbour = |unknown: Unknown, step: f64| {
+        // Not across a bound.
+        let is_held = unknowns.is_held(unknown, step, lag_limit_s);
+        let moved = if is_held { *unknowns } else { unknowns.shifted(unknown, step) };
+        moved.bounded(&[unknown], lag_limit_s)
+    };
+    let pair = |unknown: Unknown| {
+        let step = unknown.difference();
+        let [up, down] = [step, -step].map(|step| neighbour(unknown, step));
+        if precision.slack > 0.0 {
+            if up == *unknowns { [down, *unknowns] } else { [up, *unknowns] }
+        } else {
+            [up, down]
         }
-    }
-    let mut all = runs.residuals(&sets, substeps).into_iter();
+    };
+    let pairs: Vec<[Unknowns; 2]> = free.iter().map(|unknown| pair(*unknown)).collect();
+    // Each set once.
+    let others = pairs.iter().flatten().filter(|set| *set != unknowns);
+    let sets: Vec<Unknowns> = [*unknowns].into_iter().chain(others.copied()).collect();
+    let mut all = runs.residuals(&sets, precision.substeps).into_iter();
     let still = all.next()??;
     let mut columns = Vec::with_capacity(free.len());
-    for (&unknown, pair) in free.iter().zip(sets[1..].chunks(2)) {
-        let (mut column, less) = (all.next()??, all.next()??);
+    for (&unknown, pair) in free.iter().zip(&pairs) {
         let span = unknown.distance(&pair[1], &pair[0]);
-        let per_unit = if span > 0.0 { span.recip() } else { 0.0 };
+        let per_unit = if span == 0.0 { 0.0 } else { span.recip() };
+        let mut of = |set: &Unknowns| if set == unknowns { Some(still.clone()) } else { all.next()? };
+        let (mut column, less) = (of(&pair[0])?, of(&pair[1])?);
         for (column, less) in column.iter_mut().zip(&less) {
             column.iter_mut().zip(less).for_each(|(more, less)| *more = (*more - less) * per_unit);
         }
@@ -86,11 +99,12 @@ pub(super) fn derivatives(
 pub(super) fn search(runs: &Runs, start: Unknowns, free: &[Unknown], effort: Effort) -> Option<Found> {
     let Effort { precision, jacobians, least_gain } = effort;
     let weights = runs.weights(precision);
+    let readings: f64 = runs.readings().sum();
     let mut damping = 1e-3;
     let mut found: Option<Found> = None;
     for _ in 0..jacobians {
         let unknowns = found.as_ref().map_or(start, |found| found.unknowns);
-        let (columns, residuals) = derivatives(runs, &unknowns, free, precision.substeps)?;
+        let (columns, residuals) = derivatives(runs, &unknowns, free, precision)?;
         let mut sums = weights.sums(&columns, &residuals);
         let misfits = weights.misfits(&residuals);
         let mut best = Found { unknowns, residuals, misfits, rivals: Vec::new() };
@@ -125,7 +139,7 @@ pub(super) fn search(runs: &Runs, start: Unknowns, free: &[Unknown], effort: Eff
             }
         }
         let gain = first - best.misfit();
-        let least_gain = least_gain.max(LEAST_PART * best.misfit());
+        let least_gain = least_gain.max(LEAST_PART * (best.misfit() - readings));
         found = Some(best);
         if !(gain > least_gain) {
             break;

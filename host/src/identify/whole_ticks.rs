@@ -7,11 +7,15 @@
 //! Whether a tick is free of events is judged from both its ends and from how far the demand can be off in between. In
 //! doubt it is none: the sub-steps decide.
 
+use wide::f64x4;
+
 use super::simulation::{CROSSING, Delayed, LANES, Lane, Model, State};
 
 /// What a map makes: position, last demand, and the state of the drive, and of a bed.
 const ROWS: usize = 9;
 const ROWS_RIGID: usize = 6;
+/// Rows that are summed together.
+const BLOCK: usize = 3;
 /// Rows before those of the state, which are columns, too.
 const OUTPUTS: usize = 2;
 /// Columns of the map: the state, and up to four inputs.
@@ -20,7 +24,8 @@ const COLUMNS: usize = ROWS - OUTPUTS + 4;
 /// Rates over one tick up to which both ends of it tell what is between.
 const SLOW: f64 = 1.0;
 
-type Column = [Lane; ROWS];
+/// Rows by blocks, each by lane.
+type Column = [[f64x4; BLOCK]; ROWS / BLOCK];
 
 /// What acts during a whole tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,16 +126,26 @@ impl WholeTicks {
         let from = state.to_column();
         let inputs =
             [delayed.earlier, delayed.late, state.velocity.map(f64::signum), start.demand.map(f64::signum)];
-        let mut next = [[0.0; LANES]; R];
-        for (column, by) in map.iter().zip(from[OUTPUTS..R].iter().chain(&inputs)) {
-            for (sum, cells) in next.iter_mut().zip(column) {
-                for lane in 0..LANES {
-                    sum[lane] += cells[lane] * by[lane];
-                }
-            }
+        let mut by = [f64x4::ZERO; COLUMNS];
+        for (by, state) in by.iter_mut().zip(&from[OUTPUTS..R]) {
+            *by = f64x4::from(*state);
+        }
+        for (by, input) in by[R - OUTPUTS..].iter_mut().zip(inputs) {
+            *by = f64x4::from(input);
         }
         let mut column = [[0.0; LANES]; ROWS];
-        column[..R].copy_from_slice(&next);
+        // As many sums at a time as stay in registers.
+        for block in 0..R / BLOCK {
+            let mut sums = [f64x4::ZERO; BLOCK];
+            for index in 0..map.len() {
+                for row in 0..BLOCK {
+                    sums[row] += map[index][block][row] * by[index];
+                }
+            }
+            for row in 0..BLOCK {
+                column[BLOCK * block + row] = sums[row].to_array();
+            }
+        }
         let end = State { is_frozen: state.is_frozen, ..State::of_column(&column) };
         if !start.is_without_events(regime, model, state, &end, self.tick_s) {
             return false;
@@ -166,7 +181,8 @@ fn columns(model: &Model, substeps: u32, regime: Regime) -> Vec<Column> {
                 Regime::Sliding | Regime::Saturated => friction[lane] * model.coulomb_step[lane],
             });
         }
-        state.to_column()
+        let column = state.to_column();
+        core::array::from_fn(|block| core::array::from_fn(|row| f64x4::from(column[BLOCK * block + row])))
     };
     (0..(states + regime.inputs()).min(COLUMNS)).map(of).collect()
 }

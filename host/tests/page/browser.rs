@@ -70,7 +70,7 @@ impl Browser {
             "goog/cdp/execute",
             json!({"cmd": "Emulation.setDeviceMetricsOverride", "params": metrics}),
         );
-        browser.call("timeouts", json!({"script": 60_000}));
+        browser.call("timeouts", json!({"script": 300_000}));
         browser.call("url", json!({"url": address}));
         let state = browser.wait_for("return document.documentElement.dataset.state || null");
         assert_eq!(state, "ready", "{:?}", browser.complaints());
