@@ -84,7 +84,7 @@ const OTHERS: usize = 2;
 /// readings (Schwarz), and by as much again as chance does in one of e¹⁵ cases.
 const BED_GAIN: f64 = 30.0;
 
-/// Difference in misfit below which finishing what was found may decide between a bed and none.
+/// Difference in misfit below which finishing what follows may still decide between a bed and none.
 const UNDECIDED: f64 = 1e3;
 
 /// Two searches for one minimum end this far apart: positions are stairs where the limit acts, if low ones.
@@ -144,8 +144,7 @@ impl Stages {
         self.kicked(self.with_rivals(found, free)?, free)
     }
 
-    /// What was found, or better if the search had stopped on its way along the floor of a valley. Ends beside it that are hardly
-    /// worse are rivals: the floor has stairs where the limit acts.
+    /// What was found, or better if the search had stopped on its way along the floor of a valley.
     fn kicked(&self, found: Found, free: &[Unknown]) -> Option<Found> {
         let floor = floor(&self.runs, &found, free)?;
         let lag_limit_s = self.runs.lag_limit_s();
@@ -155,19 +154,14 @@ impl Stages {
                 .fold(found.unknowns, |start, (&unknown, step)| start.shifted(unknown, deviations * step));
             moved.bounded(free, lag_limit_s)
         };
-        let near: Vec<Found> = KICKS
-            .iter()
-            .filter_map(|by| search(&self.runs, start(by), free, KICKED_EFFORT))
-            .filter(|near| near.misfit() < found.misfit() + RIVAL)
-            .collect();
-        let beside: Vec<Unknowns> =
-            found.rivals.iter().copied().chain(near.iter().map(|near| near.unknowns)).collect();
-        let better = least(near.into_iter()).filter(|near| near.misfit() < found.misfit() - KICK_GAIN);
-        let best = match better {
-            Some(near) => search(&self.runs, near.unknowns, free, LAST_EFFORT)?,
-            None => found,
-        };
-        Some(Found { rivals: beside, ..best })
+        let near = KICKS.iter().filter_map(|by| search(&self.runs, start(by), free, KICKED_EFFORT));
+        match least(near).filter(|near| near.misfit() < found.misfit() - KICK_GAIN) {
+            Some(near) => {
+                let last = search(&self.runs, near.unknowns, free, LAST_EFFORT)?;
+                Some(Found { rivals: found.rivals, ..last })
+            }
+            None => Some(found),
+        }
     }
 
     /// The least of what was found and of the valleys that answer alike; those that are hardly worse are its rivals.
@@ -199,7 +193,7 @@ impl Stages {
         }
         match self.other_beds(starts) {
             Some(other) if other.misfit() < model.0.misfit() => Some((other, &ALL)),
-            _ => Some((self.finished(model.0, model.1)?, model.1)),
+            _ => Some(model),
         }
     }
 
@@ -220,8 +214,7 @@ impl Stages {
         let starts = likely_beds(&self.runs, &rigid, Precision::LAST);
         // What is promised is linear; a search may find more.
         let promising = starts.into_iter().take(BEDS).filter(|(_, gain)| *gain > PROMISE);
-        let begun = promising.filter_map(|(start, _)| search(&self.runs, start, &ALL, EXCHANGED_EFFORT));
-        let bed = least(begun).and_then(|begun| search(&self.runs, begun.unknowns, &ALL, LAST_EFFORT));
+        let bed = least(promising.filter_map(|(start, _)| search(&self.runs, start, &ALL, LAST_EFFORT)));
         Some(match bed.and_then(|bed| self.with_rivals(bed, &ALL)) {
             Some(bed) if self.is_bed(&rigid, &bed) => (bed, &ALL),
             _ => (rigid, without_bed()),
@@ -250,16 +243,15 @@ impl Stages {
         self.decided(rigid, bed)
     }
 
-    /// With a bed or without. What is far behind, or far from the recordings, is not finished.
+    /// With a bed or without. The one that is behind is not finished where that can't decide any more.
     fn decided(&self, mut rigid: Found, mut bed: Found) -> Option<Model> {
-        if !self.is_met(&rigid) && !self.is_met(&bed) {
-            return Some(if bed.misfit() < rigid.misfit() { (bed, &ALL) } else { (rigid, without_bed()) });
-        }
-        let is_near = (rigid.misfit() - bed.misfit()).abs() < UNDECIDED;
-        if is_near || !self.is_bed(&rigid, &bed) {
+        let gap = (rigid.misfit() - bed.misfit()).abs();
+        let is_lost = |behind: &Found| gap > if self.is_met(behind) { UNDECIDED } else { NEAR };
+        let is_bed = self.is_bed(&rigid, &bed);
+        if !is_bed || !is_lost(&rigid) {
             rigid = self.finished(rigid, without_bed())?;
         }
-        if is_near || self.is_bed(&rigid, &bed) {
+        if is_bed || !is_lost(&bed) {
             bed = self.finished(bed, &ALL)?;
         }
         Some(if self.is_bed(&rigid, &bed) { (bed, &ALL) } else { (rigid, without_bed()) })

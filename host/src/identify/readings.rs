@@ -266,7 +266,7 @@ impl Runs {
     }
 
     /// Multiplies the variances of each run.
-    pub(super) fn inflate(&mut self, factors: &[f64]) {
+    pub(super) fn scale_variances(&mut self, factors: &[f64]) {
         self.runs.iter_mut().zip(factors).for_each(|(run, factor)| run.scale *= factor);
     }
 

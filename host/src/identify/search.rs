@@ -45,7 +45,7 @@ pub(super) struct Effort {
 const DAMPINGS: [f64; LANES] = [0.01, 1.0, 30.0, 1e3];
 /// A search also ends where it gains less than this part of the misfit beyond what readings leave: far from them the last digits
 /// tell nothing.
-const LEAST_PART: f64 = 3e-4;
+const LEAST_PART: f64 = 1e-4;
 /// Steps with one Jacobian ...
 const STEPS_PER_JACOBIAN: usize = 5;
 /// ... while each gains this part of the misfit.
