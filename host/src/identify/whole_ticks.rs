@@ -16,7 +16,7 @@ const ROWS: usize = 9;
 const ROWS_RIGID: usize = 6;
 /// Rows that are summed together.
 const BLOCK: usize = 3;
-const _: () = assert!(ROWS % BLOCK == 0 && ROWS_RIGID % BLOCK == 0);
+const _: () = assert!(ROWS.is_multiple_of(BLOCK) && ROWS_RIGID.is_multiple_of(BLOCK));
 /// Rows before those of the state, which are columns, too.
 const OUTPUTS: usize = 2;
 /// Columns of the map: the state, and up to four inputs.
