@@ -48,14 +48,19 @@ const PROMISED: f64 = 0.9;
 /// Samples that intervals are read from: their ends are good to a thirtieth.
 const SAMPLES: usize = 2000;
 
+/// The autocorrelation of all runs' residuals, by lag; 0 where there are none.
+fn autocorrelation(runs: &[&[f64]]) -> impl Fn(usize) -> f64 {
+    let power: f64 = runs.iter().map(|run| dot(run, run)).sum();
+    move |lag| {
+        let of_run = |run: &&[f64]| run.get(lag..).map_or(0.0, |later| dot(later, run));
+        if power > 0.0 { runs.iter().map(of_run).sum::<f64>() / power } else { 0.0 }
+    }
+}
+
 /// γ of one run's residuals, at least 1.
 fn correlation_factor(residuals: &[f64]) -> f64 {
-    let power = dot(residuals, residuals);
-    if !(power > 0.0) {
-        return 1.0;
-    }
-    let correlations =
-        (1..LAGS_MAX.min(residuals.len())).map(|lag| dot(&residuals[lag..], residuals) / power);
+    let run = [residuals];
+    let correlations = (1..LAGS_MAX.min(residuals.len())).map(autocorrelation(&run));
     // Beyond its first zero the estimate is noise.
     1.0 + 2.0 * correlations.take_while(|&correlation| correlation > 0.0).sum::<f64>()
 }
@@ -63,14 +68,8 @@ fn correlation_factor(residuals: &[f64]) -> f64 {
 /// The variance of sums of some [`SUMMED`] residuals over that of independent ones. Rounding errors of an axis that moves by part of
 /// a count from tick to tick run through the count, and their sums hardly grow.
 fn scatter_of_sums(whitened: &[Vec<f64>]) -> f64 {
-    let power: f64 = whitened.iter().map(|run| dot(run, run)).sum();
-    if !(power > 0.0) {
-        return 1.0;
-    }
-    let correlation = |lag: usize| {
-        let of_run = |run: &Vec<f64>| run.get(lag..).map_or(0.0, |later| dot(later, run));
-        whitened.iter().map(of_run).sum::<f64>() / power
-    };
+    let runs: Vec<&[f64]> = whitened.iter().map(Vec::as_slice).collect();
+    let correlation = autocorrelation(&runs);
     // Weights of Bartlett: a variance is never negative.
     let share = |lag: usize| 1.0 - lag as f64 / SUMMED as f64;
     1.0 + 2.0 * (1..SUMMED).map(|lag| share(lag) * correlation(lag)).sum::<f64>()

@@ -122,7 +122,7 @@ struct Stages {
 
 impl Stages {
     fn readings(&self) -> f64 {
-        self.runs.readings().sum()
+        self.runs.readings()
     }
 
     /// One stage, with a current limit that acts.
@@ -311,7 +311,7 @@ fn settled(
 ) -> Option<Result<Fit, IdentifyError>> {
     runs.regroup(&found.unknowns, SUBSTEPS);
     let misfits = runs.weights(Precision::LAST).misfits(&found.residuals_of(&runs)?);
-    let readings: f64 = runs.readings().sum();
+    let readings = runs.readings();
     let misfit: f64 = misfits.iter().sum();
     let is_met = misfit < MET * readings;
     if is_met {
@@ -346,7 +346,7 @@ fn without_filter(runs: &Runs, found: &Found, free: &[Unknown]) -> Option<Found>
     let mut start = found.unknowns;
     start.set(Unknown::FilterSpread, 0.0);
     let simpler = search(runs, start, &others, SETTLING_EFFORT)?;
-    let readings: f64 = runs.readings().sum();
+    let readings = runs.readings();
     let is_enough = simpler.misfit() < found.misfit() + readings.ln() + STAIRS;
     let rivals = || found.rivals.iter().copied().chain([found.unknowns]).collect();
     is_enough.then(|| Found { rivals: rivals(), ..simpler })

@@ -280,9 +280,9 @@ impl Runs {
         self.resolution_mm
     }
 
-    /// Independent readings of each run.
-    pub(super) fn readings(&self) -> impl Iterator<Item = f64> {
-        self.runs.iter().map(|run| run.actual_mm.len() as f64)
+    /// Independent readings of all runs.
+    pub(super) fn readings(&self) -> f64 {
+        self.runs.iter().map(|run| run.actual_mm.len() as f64).sum()
     }
 
     /// The residuals of several sets of unknowns; `None` for one that ends in what is not a number.

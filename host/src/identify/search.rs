@@ -84,7 +84,7 @@ pub(super) fn derivatives(
     let mut columns = Vec::with_capacity(free.len());
     for (&unknown, pair) in free.iter().zip(&pairs) {
         let span = unknown.distance(&pair[1], &pair[0]);
-        let per_unit = if span == 0.0 { 0.0 } else { span.recip() };
+        let per_unit = if span.abs() > 0.0 { span.recip() } else { 0.0 };
         let mut of = |set: &Unknowns| if set == unknowns { Some(still.clone()) } else { all.next()? };
         let (mut column, less) = (of(&pair[0])?, of(&pair[1])?);
         for (column, less) in column.iter_mut().zip(&less) {
@@ -99,7 +99,7 @@ pub(super) fn derivatives(
 pub(super) fn search(runs: &Runs, start: Unknowns, free: &[Unknown], effort: Effort) -> Option<Found> {
     let Effort { precision, jacobians, least_gain } = effort;
     let weights = runs.weights(precision);
-    let readings: f64 = runs.readings().sum();
+    let readings = runs.readings();
     let mut damping = 1e-3;
     let mut found: Option<Found> = None;
     for _ in 0..jacobians {

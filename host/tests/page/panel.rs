@@ -77,7 +77,8 @@ pub(crate) fn a_program_is_driven_from_the_panel() {
     // The picture of it, too.
     wait(&browser, "window.panel.pictures.page?.run.header.program === 'part.ngc'");
     assert!(browser.number("window.panel.pictures.page.run.header.length_mm") == 30.0);
-    // A tenth as fast, by the keys that LinuxCNC's operators know: a browser that is late holds it on its way, too. A file that was chosen has the focus no more.
+    // A tenth as fast, by the keys that LinuxCNC's operators know: a browser that is late holds it on its way, too. A file that
+    // was chosen has the focus no more.
     browser.run("document.querySelector('input[type=file]').focus(); document.activeElement.dispatchEvent(new Event('change'))");
     browser.keys("1");
     wait(&browser, "document.querySelector('[data-of=override]').textContent === '10 %'");
