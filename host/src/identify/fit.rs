@@ -68,13 +68,22 @@ const LOST: f64 = 100.0;
 const KICKS: [f64; 4] = [-30.0, -9.0, 9.0, 30.0];
 const KICKED_EFFORT: Effort = Effort { precision: Precision::LAST, jacobians: 2, least_gain: 10.0 };
 const KICK_GAIN: f64 = 0.5;
+/// The same where the model does not follow: the floor is curved there, and a search stops far from its end.
+const FAR_KICKS: [f64; 6] = [-100.0, -30.0, -9.0, 9.0, 30.0, 100.0];
+const FAR_EFFORT: Effort = Effort { jacobians: 6, ..KICKED_EFFORT };
+/// Most kicks after each other.
+const KICKED_ROUNDS: usize = 4;
 const SETTLING_EFFORT: Effort = Effort { jacobians: 5, ..LAST_EFFORT };
 
 /// Beds that are followed.
 const BEDS: usize = 3;
 /// Promised gain in misfit from which a bed is searched for.
 const PROMISE: f64 = 12.0;
-/// Beds that are tried where the rigid model is no guide: frequencies \[Hz\], damping and mass ratio, and Jacobians.
+/// Misfit for each reading from which what was found may be a false minimum: that of a right model scatters by some
+/// hundredths.
+const FOLLOWED_WELL: f64 = 1.05;
+/// Beds that are tried then, without the rigid model as a guide: frequencies \[Hz\], damping and mass ratio, and
+/// Jacobians.
 const OTHER_BEDS_HZ: [f64; 9] = [5.5, 8.0, 12.0, 17.0, 25.0, 36.0, 52.0, 75.0, 108.0];
 const OTHER_BED: (f64, f64) = (0.03, 0.05);
 const OTHER_JACOBIANS: usize = 3;
@@ -141,12 +150,27 @@ impl Stages {
         if found.misfit() > LOST * self.readings() {
             return Some(found);
         }
-        self.kicked(self.with_rivals(found, free)?, free)
+        // What answers alike is looked for from where the model follows, if it does anywhere.
+        let found = if self.is_met(&found) { found } else { self.kicked(found, free)? };
+        let found = self.with_rivals(found, free)?;
+        if self.is_met(&found) { self.kicked(found, free) } else { Some(found) }
     }
 
-    /// What was found, or better if the search had stopped on its way along the floor of a valley.
-    fn kicked(&self, found: Found, free: &[Unknown]) -> Option<Found> {
-        let floor = floor(&self.runs, &found, free)?;
+    /// What was found, or better if the search had stopped on its way along the floor of a valley. What follows may stop
+    /// there, too.
+    fn kicked(&self, mut found: Found, free: &[Unknown]) -> Option<Found> {
+        for _ in 0..KICKED_ROUNDS {
+            let Some(near) = self.along_the_floor(&found, free)? else { break };
+            let last = search(&self.runs, near.unknowns, free, LAST_EFFORT)?;
+            found = Found { rivals: found.rivals, ..last };
+        }
+        Some(found)
+    }
+
+    /// The least that is found from places along the floor of the valley, if it is less than what was found. The outer
+    /// `None`: nothing can be linearised there.
+    fn along_the_floor(&self, found: &Found, free: &[Unknown]) -> Option<Option<Found>> {
+        let floor = floor(&self.runs, found, free)?;
         let lag_limit_s = self.runs.lag_limit_s();
         let start = |deviations: &f64| {
             let steps = free.iter().zip(&floor);
@@ -154,25 +178,21 @@ impl Stages {
                 .fold(found.unknowns, |start, (&unknown, step)| start.shifted(unknown, deviations * step));
             moved.bounded(free, lag_limit_s)
         };
-        let near = KICKS.iter().filter_map(|by| search(&self.runs, start(by), free, KICKED_EFFORT));
-        match least(near).filter(|near| near.misfit() < found.misfit() - KICK_GAIN) {
-            Some(near) => {
-                let last = search(&self.runs, near.unknowns, free, LAST_EFFORT)?;
-                Some(Found { rivals: found.rivals, ..last })
-            }
-            None => Some(found),
-        }
+        let from = |kicks: &[f64], effort: Effort| {
+            least(kicks.iter().filter_map(|by| search(&self.runs, start(by), free, effort)))
+        };
+        let near =
+            if self.is_met(found) { from(&KICKS, KICKED_EFFORT) } else { from(&FAR_KICKS, FAR_EFFORT) };
+        Some(near.filter(|near| near.misfit() < found.misfit() - KICK_GAIN))
     }
 
     /// The least of what was found and of the valleys that answer alike; those that are hardly worse are its rivals.
     fn with_rivals(&self, found: Found, free: &[Unknown]) -> Option<Found> {
-        let mut all: Vec<Found> = Vec::new();
-        for start in found.unknowns.exchanged() {
-            let near =
-                search(&self.runs, start.bounded(free, self.runs.lag_limit_s()), free, EXCHANGED_EFFORT);
-            let near = near.filter(|near| near.misfit() < found.misfit() + NEAR);
-            all.extend(near.and_then(|near| search(&self.runs, near.unknowns, free, LAST_EFFORT)));
-        }
+        let mut all = self.exchanged(&found, &found, free);
+        // What answers alike may not have been reached from what was found, but from what answers like that.
+        let close = all.iter().filter(|near| near.misfit() < found.misfit() + UNDECIDED);
+        let next: Vec<Found> = close.flat_map(|near| self.exchanged(near, &found, free)).collect();
+        all.extend(next);
         all.push(found);
         all.sort_by(|a, b| a.misfit().total_cmp(&b.misfit()));
         let mut all = all.into_iter();
@@ -182,19 +202,33 @@ impl Stages {
         Some(best)
     }
 
+    /// The valleys that answer like `near`, where they are not far worse than what was found.
+    fn exchanged(&self, near: &Found, found: &Found, free: &[Unknown]) -> Vec<Found> {
+        let starts = near.unknowns.exchanged();
+        let lag_limit_s = self.runs.lag_limit_s();
+        let begun = starts
+            .into_iter()
+            .filter_map(|start| search(&self.runs, start.bounded(free, lag_limit_s), free, EXCHANGED_EFFORT))
+            .filter(|begun| begun.misfit() < found.misfit() + NEAR);
+        begun.filter_map(|begun| search(&self.runs, begun.unknowns, free, LAST_EFFORT)).collect()
+    }
+
     fn best(&mut self, starts: &[Unknowns]) -> Option<Model> {
         let rough = least(starts.iter().filter_map(|start| self.stage(*start, without_bed(), ROUGH_EFFORT)))?;
         self.runs.regroup(&rough.unknowns, ROUGH_EFFORT.precision.substeps);
         let middle = self.stage(rough.unknowns, without_bed(), MIDDLE_EFFORT)?;
         let is_rigid = middle.misfit() < MET * self.readings();
         let model = if is_rigid { self.rigid_first(&middle) } else { self.bed_first(&middle) }?;
-        if self.is_met(&model.0) {
+        if model.0.misfit() < FOLLOWED_WELL * self.readings() {
             return Some(model);
         }
-        match self.other_beds(starts) {
-            Some(other) if other.misfit() < model.0.misfit() => Some((other, &ALL)),
-            _ => Some(model),
-        }
+        let Some(other) = self.other_beds(starts) else { return Some(model) };
+        // Readings were grouped anew.
+        let misfits = self.runs.weights(Precision::LAST).misfits(&model.0.residuals_of(&self.runs)?);
+        let before = Found { misfits, ..model.0.clone() };
+        let has_bed = model.1.len() == ALL.len();
+        let is_better = if has_bed { other.misfit() < before.misfit() } else { self.is_bed(&before, &other) };
+        Some(if is_better { (other, &ALL) } else { model })
     }
 
     fn is_met(&self, found: &Found) -> bool {
