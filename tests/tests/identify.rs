@@ -359,8 +359,7 @@ const CIRCLES_HZ: [f64; 2] = [4.0, 16.0];
 /// Ten drives of which everything varies, and three that were found wrong. 1017 never reaches its current limit: the
 /// direction in which filter, gain and current loop trade is flat there but for the drive's steps. The search for 76
 /// stops far from its end, along a floor that is curved. 245 is in a valley from which only another wrong one is seen.
-/// `cargo bench -p motion-tests --bench identify
-/// -- 0 1000` surveys as many as one likes; `docs/DRIVES.md` is what it said.
+/// `cargo bench -p motion-tests --bench identify -- 0 1000` surveys as many as one likes; `docs/DRIVES.md` is what it said.
 #[test]
 fn random_drives_are_found_and_tuned() {
     let (mut driven, seeds) = (0, (0..10).chain([76, 245, 1017]));

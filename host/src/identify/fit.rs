@@ -160,20 +160,19 @@ impl Stages {
     /// there, too.
     fn kicked(&self, mut found: Found, free: &[Unknown]) -> Option<Found> {
         for _ in 0..KICKED_ROUNDS {
-            let Some(near) = self.along_the_floor(&found, free)? else { break };
+            let floor = floor(&self.runs, &found, free)?;
+            let Some(near) = self.along(&floor, &found, free) else { break };
             let last = search(&self.runs, near.unknowns, free, LAST_EFFORT)?;
             found = Found { rivals: found.rivals, ..last };
         }
         Some(found)
     }
 
-    /// The least that is found from places along the floor of the valley, if it is less than what was found. The outer
-    /// `None`: nothing can be linearised there.
-    fn along_the_floor(&self, found: &Found, free: &[Unknown]) -> Option<Option<Found>> {
-        let floor = floor(&self.runs, found, free)?;
+    /// The least that is found from places along the floor of the valley, if it is less than what was found.
+    fn along(&self, floor: &[f64], found: &Found, free: &[Unknown]) -> Option<Found> {
         let lag_limit_s = self.runs.lag_limit_s();
         let start = |deviations: &f64| {
-            let steps = free.iter().zip(&floor);
+            let steps = free.iter().zip(floor);
             let moved = steps
                 .fold(found.unknowns, |start, (&unknown, step)| start.shifted(unknown, deviations * step));
             moved.bounded(free, lag_limit_s)
@@ -183,7 +182,7 @@ impl Stages {
         };
         let near =
             if self.is_met(found) { from(&KICKS, KICKED_EFFORT) } else { from(&FAR_KICKS, FAR_EFFORT) };
-        Some(near.filter(|near| near.misfit() < found.misfit() - KICK_GAIN))
+        near.filter(|near| near.misfit() < found.misfit() - KICK_GAIN)
     }
 
     /// The least of what was found and of the valleys that answer alike; those that are hardly worse are its rivals.
@@ -224,7 +223,7 @@ impl Stages {
         }
         let Some(other) = self.other_beds(starts) else { return Some(model) };
         // Readings were grouped anew.
-        let misfits = self.runs.weights(Precision::LAST).misfits(&model.0.residuals_of(&self.runs)?);
+        let misfits = model.0.misfits_of(&self.runs)?;
         let before = Found { misfits, ..model.0.clone() };
         let has_bed = model.1.len() == ALL.len();
         let is_better = if has_bed { other.misfit() < before.misfit() } else { self.is_bed(&before, &other) };
@@ -344,7 +343,7 @@ fn settled(
     free: &[Unknown],
 ) -> Option<Result<Fit, IdentifyError>> {
     runs.regroup(&found.unknowns, SUBSTEPS);
-    let misfits = runs.weights(Precision::LAST).misfits(&found.residuals_of(&runs)?);
+    let misfits = found.misfits_of(&runs)?;
     let readings = runs.readings();
     let misfit: f64 = misfits.iter().sum();
     let is_met = misfit < MET * readings;

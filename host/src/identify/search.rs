@@ -25,9 +25,10 @@ impl Found {
         self.misfits.iter().sum()
     }
 
-    /// The residuals again, for readings that were grouped anew since.
-    pub(super) fn residuals_of(&self, runs: &Runs) -> Option<Residuals> {
-        runs.residuals(&[self.unknowns], SUBSTEPS).pop()?
+    /// The misfits again, for readings that were grouped anew since.
+    pub(super) fn misfits_of(&self, runs: &Runs) -> Option<Vec<f64>> {
+        let residuals = runs.residuals(&[self.unknowns], SUBSTEPS).pop()??;
+        Some(runs.weights(Precision::LAST).misfits(&residuals))
     }
 }
 
