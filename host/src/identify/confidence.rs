@@ -133,12 +133,9 @@ pub(super) fn confidence(runs: &mut Runs, found: &Found, free: &[Unknown], left:
     Some(Confidence { best: found.unknowns, samples, widening: 1.0 + left.max(0.0).sqrt() / 1.96 })
 }
 
-/// One standard deviation along the direction that the recordings fix worst, in the coordinates of the `free`
-/// unknowns.
-pub(super) fn floor(runs: &Runs, found: &Found, free: &[Unknown]) -> Option<Vec<f64>> {
-    let (columns, residuals) = derivatives(runs, &found.unknowns, free, Precision::LAST)?;
-    let information = runs.weights(Precision::LAST).sums(&columns, &residuals).normal;
-    Some(weakest(&Shown::of(information, free), &[])?.0)
+/// One standard deviation along the direction that is fixed worst, in the coordinates of the `free` unknowns.
+pub(super) fn floor(information: &Symmetric, free: &[Unknown]) -> Option<Vec<f64>> {
+    Some(weakest(&Shown::of(information.clone(), free), &[])?.0)
 }
 
 /// The information of the unknowns that some run shows; the others are held.

@@ -6,14 +6,15 @@
 
 use super::bed::likely_beds;
 use super::cholesky::Symmetric;
-use super::confidence::{Confidence, confidence, floor};
+use super::confidence::{Confidence, confidence};
 use super::differences::Parabolas;
 use super::estimate::MET;
 use super::parameters::{ALL, Unknown, Unknowns, without_bed};
 use super::readings::{Precision, Runs, dot};
 use super::recording::{AxisRecording, span};
-use super::search::{Effort, Found, search};
+use super::search::{Effort, Found, LAST_EFFORT, is_met, least, search};
 use super::simulation::SUBSTEPS;
+use super::valleys::{self, EXCHANGED_EFFORT, NEAR, SETTLING_EFFORT, UNDECIDED, finished, with_rivals};
 use super::{AxisParametersFound, BedEstimate, Estimate, IdentifyError, RunMatch};
 
 /// Starts of the grid: velocity gain \[1/s\], integral time \[s\], lag \[ticks\] ...
@@ -55,25 +56,6 @@ const MIDDLE_EFFORT: Effort =
 const BEGUN_EFFORT: Effort = Effort { jacobians: 4, ..MIDDLE_EFFORT };
 const FINE_EFFORT: Effort =
     Effort { precision: Precision { substeps: SUBSTEPS, slack: 5e-5 }, jacobians: 6, least_gain: 1.0 };
-const LAST_EFFORT: Effort = Effort { precision: Precision::LAST, jacobians: 25, least_gain: 0.02 };
-
-const EXCHANGED_EFFORT: Effort = Effort { precision: Precision::LAST, jacobians: 4, least_gain: 10.0 };
-/// A valley that is this much worse after a few steps is left; one that is this much worse at its end is a rival,
-/// which chance prefers in one of a hundred cases.
-const NEAR: f64 = 3e4;
-const RIVAL: f64 = 9.0;
-/// Misfit for each reading beyond which a model has no valley worth looking beside.
-const LOST: f64 = 100.0;
-/// Kicks along the floor, in standard deviations, and the gain in misfit for which what follows is searched.
-const KICKS: [f64; 4] = [-30.0, -9.0, 9.0, 30.0];
-const KICKED_EFFORT: Effort = Effort { precision: Precision::LAST, jacobians: 2, least_gain: 10.0 };
-const KICK_GAIN: f64 = 0.5;
-/// The same where the model does not follow: the floor is curved there, and a search stops far from its end.
-const FAR_KICKS: [f64; 6] = [-100.0, -30.0, -9.0, 9.0, 30.0, 100.0];
-const FAR_EFFORT: Effort = Effort { jacobians: 6, ..KICKED_EFFORT };
-/// Most kicks after each other.
-const KICKED_ROUNDS: usize = 4;
-const SETTLING_EFFORT: Effort = Effort { jacobians: 5, ..LAST_EFFORT };
 
 /// Beds that are followed.
 const BEDS: usize = 3;
@@ -92,9 +74,6 @@ const OTHERS: usize = 2;
 /// A bed must lower the misfit by what its three unknowns are worth by themselves, three logarithms of the number of
 /// readings (Schwarz), and by as much again as chance does in one of e¹⁵ cases.
 const BED_GAIN: f64 = 30.0;
-
-/// Difference in misfit below which finishing what follows may still decide between a bed and none.
-const UNDECIDED: f64 = 1e3;
 
 /// Two searches for one minimum end this far apart: positions are stairs where the limit acts, if low ones.
 const STAIRS: f64 = 10.0;
@@ -145,73 +124,6 @@ impl Stages {
         search(&self.runs, fine.unknowns, free, LAST_EFFORT)
     }
 
-    /// What was found by the last stages, or better if there is better near it; with its rivals.
-    fn finished(&self, found: Found, free: &[Unknown]) -> Option<Found> {
-        if found.misfit() > LOST * self.readings() {
-            return Some(found);
-        }
-        // What answers alike is looked for from where the model follows, if it does anywhere.
-        let found = if self.is_met(&found) { found } else { self.kicked(found, free)? };
-        let found = self.with_rivals(found, free)?;
-        if self.is_met(&found) { self.kicked(found, free) } else { Some(found) }
-    }
-
-    /// What was found, or better if the search had stopped on its way along the floor of a valley. What follows may stop
-    /// there, too.
-    fn kicked(&self, mut found: Found, free: &[Unknown]) -> Option<Found> {
-        for _ in 0..KICKED_ROUNDS {
-            let floor = floor(&self.runs, &found, free)?;
-            let Some(near) = self.along(&floor, &found, free) else { break };
-            let last = search(&self.runs, near.unknowns, free, LAST_EFFORT)?;
-            found = Found { rivals: found.rivals, ..last };
-        }
-        Some(found)
-    }
-
-    /// The least that is found from places along the floor of the valley, if it is less than what was found.
-    fn along(&self, floor: &[f64], found: &Found, free: &[Unknown]) -> Option<Found> {
-        let lag_limit_s = self.runs.lag_limit_s();
-        let start = |deviations: &f64| {
-            let steps = free.iter().zip(floor);
-            let moved = steps
-                .fold(found.unknowns, |start, (&unknown, step)| start.shifted(unknown, deviations * step));
-            moved.bounded(free, lag_limit_s)
-        };
-        let from = |kicks: &[f64], effort: Effort| {
-            least(kicks.iter().filter_map(|by| search(&self.runs, start(by), free, effort)))
-        };
-        let near =
-            if self.is_met(found) { from(&KICKS, KICKED_EFFORT) } else { from(&FAR_KICKS, FAR_EFFORT) };
-        near.filter(|near| near.misfit() < found.misfit() - KICK_GAIN)
-    }
-
-    /// The least of what was found and of the valleys that answer alike; those that are hardly worse are its rivals.
-    fn with_rivals(&self, found: Found, free: &[Unknown]) -> Option<Found> {
-        let mut all = self.exchanged(&found, &found, free);
-        // What answers alike may not have been reached from what was found, but from what answers like that.
-        let close = all.iter().filter(|near| near.misfit() < found.misfit() + UNDECIDED);
-        let next: Vec<Found> = close.flat_map(|near| self.exchanged(near, &found, free)).collect();
-        all.extend(next);
-        all.push(found);
-        all.sort_by(|a, b| a.misfit().total_cmp(&b.misfit()));
-        let mut all = all.into_iter();
-        let mut best = all.next()?;
-        let is_rival = |other: &Found| other.misfit() < best.misfit() + RIVAL;
-        best.rivals = all.filter(is_rival).map(|other| other.unknowns).collect();
-        Some(best)
-    }
-
-    /// The valleys that answer like `near`, where they are not far worse than what was found.
-    fn exchanged(&self, near: &Found, found: &Found, free: &[Unknown]) -> Vec<Found> {
-        let starts = near.unknowns.exchanged();
-        let lag_limit_s = self.runs.lag_limit_s();
-        let begun = starts
-            .into_iter()
-            .filter_map(|start| search(&self.runs, start.bounded(free, lag_limit_s), free, EXCHANGED_EFFORT))
-            .filter(|begun| begun.misfit() < found.misfit() + NEAR);
-        begun.filter_map(|begun| search(&self.runs, begun.unknowns, free, LAST_EFFORT)).collect()
-    }
-
     fn best(&mut self, starts: &[Unknowns]) -> Option<Model> {
         let rough = least(starts.iter().filter_map(|start| self.stage(*start, without_bed(), ROUGH_EFFORT)))?;
         self.runs.regroup(&rough.unknowns, ROUGH_EFFORT.precision.substeps);
@@ -230,10 +142,6 @@ impl Stages {
         Some(if is_better { (other, &ALL) } else { model })
     }
 
-    fn is_met(&self, found: &Found) -> bool {
-        found.misfit() < MET * self.readings()
-    }
-
     /// Whether the misfits tell a bed from chance.
     fn is_bed(&self, rigid: &Found, bed: &Found) -> bool {
         let each = (bed.misfit() / self.readings()).max(1.0);
@@ -243,12 +151,12 @@ impl Stages {
     /// Where the rigid model follows in the middle: a bed, if its remainder promises one.
     fn rigid_first(&mut self, middle: &Found) -> Option<Model> {
         self.runs.regroup(&middle.unknowns, SUBSTEPS);
-        let rigid = self.finished(self.last(middle.unknowns, without_bed())?, without_bed())?;
+        let rigid = finished(&self.runs, self.last(middle.unknowns, without_bed())?, without_bed())?;
         let starts = likely_beds(&self.runs, &rigid, Precision::LAST);
         // What is promised is linear; a search may find more.
         let promising = starts.into_iter().take(BEDS).filter(|(_, gain)| *gain > PROMISE);
         let bed = least(promising.filter_map(|(start, _)| search(&self.runs, start, &ALL, LAST_EFFORT)));
-        Some(match bed.and_then(|bed| self.with_rivals(bed, &ALL)) {
+        Some(match bed.and_then(|bed| with_rivals(&self.runs, bed, &ALL)) {
             Some(bed) if self.is_bed(&rigid, &bed) => (bed, &ALL),
             _ => (rigid, without_bed()),
         })
@@ -267,9 +175,12 @@ impl Stages {
         start.set(Unknown::BedMassRatio, 0.0);
         let beside = search(&self.runs, start, without_bed(), EXCHANGED_EFFORT);
         let beside = beside.filter(|beside| beside.misfit() < bed.misfit() + NEAR);
-        if self.is_met(&bed) && bed.unknowns.get(Unknown::BedMassRatio) > CERTAIN_RATIO && beside.is_none() {
+        if is_met(&self.runs, &bed)
+            && bed.unknowns.get(Unknown::BedMassRatio) > CERTAIN_RATIO
+            && beside.is_none()
+        {
             // The rigid model misses it by far, wherever it starts.
-            return Some((self.finished(bed, &ALL)?, &ALL));
+            return Some((finished(&self.runs, bed, &ALL)?, &ALL));
         }
         let beside = beside.and_then(|near| search(&self.runs, near.unknowns, without_bed(), LAST_EFFORT));
         let rigid = least([self.last(middle.unknowns, without_bed()), beside].into_iter().flatten())?;
@@ -279,13 +190,13 @@ impl Stages {
     /// With a bed or without. The one that is behind is not finished where that can't decide any more.
     fn decided(&self, mut rigid: Found, mut bed: Found) -> Option<Model> {
         let gap = (rigid.misfit() - bed.misfit()).abs();
-        let is_lost = |behind: &Found| gap > if self.is_met(behind) { UNDECIDED } else { NEAR };
+        let is_lost = |behind: &Found| gap > if is_met(&self.runs, behind) { UNDECIDED } else { NEAR };
         let is_bed = self.is_bed(&rigid, &bed);
         if !is_bed || !is_lost(&rigid) {
-            rigid = self.finished(rigid, without_bed())?;
+            rigid = finished(&self.runs, rigid, without_bed())?;
         }
         if is_bed || !is_lost(&bed) {
-            bed = self.finished(bed, &ALL)?;
+            bed = finished(&self.runs, bed, &ALL)?;
         }
         Some(if self.is_bed(&rigid, &bed) { (bed, &ALL) } else { (rigid, without_bed()) })
     }
@@ -310,12 +221,8 @@ impl Stages {
         });
         let middle = least(followed)?;
         self.runs.regroup(&middle.unknowns, SUBSTEPS);
-        self.finished(self.last(middle.unknowns, &ALL)?, &ALL)
+        finished(&self.runs, self.last(middle.unknowns, &ALL)?, &ALL)
     }
-}
-
-fn least(found: impl Iterator<Item = Found>) -> Option<Found> {
-    found.min_by(|a, b| a.misfit().total_cmp(&b.misfit()))
 }
 
 /// `start` with the current limit that fits best.
@@ -350,9 +257,7 @@ fn settled(
     if is_met {
         runs.rescale(&misfits);
     }
-    let rivals = core::mem::take(&mut found.rivals);
-    found = search(&runs, found.unknowns, free, SETTLING_EFFORT)?;
-    found.rivals = rivals;
+    found = valleys::settled(&runs, &found, free)?;
     if let Some(simpler) = without_filter(&runs, &found, free) {
         found = simpler;
     }

@@ -64,6 +64,7 @@ mod readings;
 mod search;
 mod bed;
 mod confidence;
+mod valleys;
 mod fit;
 mod estimate;
 mod display;

@@ -237,10 +237,17 @@ impl Runs {
         for index in 0..self.runs.len() {
             let mut positions = Vec::with_capacity(self.raw[index].len());
             let command = &self.runs[index].command_mm_s;
-            let limited = simulation.run(command, &mut |_, at| positions.push(at[0]));
-            let motion =
-                Motion { command_mm_s: command, positions_mm: &positions, limited: &limited, tick_s };
-            let moments = motion.offsets(unknowns);
+            let limited = simulation.run(command, &mut |_, state| positions.push(state.position[0]));
+            let motion = Motion {
+                simulation: &simulation,
+                unknowns,
+                command_mm_s: command,
+                positions_mm: &positions,
+                limited: &limited,
+                tick_s,
+            };
+            // Slack is wider than what moments leave.
+            let moments = if substeps == SUBSTEPS { motion.offsets() } else { Vec::new() };
             if resolution_mm > 0.0 {
                 self.group(index, &|tick| {
                     let counts = (positions[tick + 1] - positions[tick]) / resolution_mm;
@@ -297,7 +304,7 @@ impl Runs {
         for run in &self.runs {
             let mut sums = vec![[0.0; LANES]; run.actual_mm.len()];
             let mut group = 0;
-            simulation.run(&run.command_mm_s, &mut |tick, at| {
+            simulation.run(&run.command_mm_s, &mut |tick, state| {
                 if tick < run.starts[0] {
                     return;
                 }
@@ -305,7 +312,7 @@ impl Runs {
                     group += 1;
                 }
                 for lane in 0..LANES {
-                    sums[group][lane] += at[lane];
+                    sums[group][lane] += state.position[lane];
                 }
             });
             for (lane, residuals) in all.iter_mut().enumerate() {

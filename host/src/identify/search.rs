@@ -5,6 +5,7 @@
 //! is all that a right model leaves. A run that the model does not follow counts for less, by that much.
 
 use super::cholesky::Symmetric;
+use super::estimate::MET;
 use super::parameters::{Unknown, Unknowns};
 use super::readings::{Precision, Residuals, Runs, Sums};
 use super::simulation::{LANES, SUBSTEPS};
@@ -40,6 +41,19 @@ pub(super) struct Effort {
     pub(super) jacobians: usize,
     /// The gain in misfit below which it ends.
     pub(super) least_gain: f64,
+}
+
+/// That of the last stage.
+pub(super) const LAST_EFFORT: Effort = Effort { precision: Precision::LAST, jacobians: 25, least_gain: 0.02 };
+
+/// The one with the least misfit.
+pub(super) fn least(found: impl Iterator<Item = Found>) -> Option<Found> {
+    found.min_by(|a, b| a.misfit().total_cmp(&b.misfit()))
+}
+
+/// Whether what was found explains the recordings.
+pub(super) fn is_met(runs: &Runs, found: &Found) -> bool {
+    found.misfit() < MET * runs.readings()
 }
 
 /// Dampings that are tried at once, over the last that was good.

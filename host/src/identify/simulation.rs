@@ -230,14 +230,14 @@ impl Simulation {
         }
     }
 
-    /// The positions of an axis that starts at rest at 0, at the start of every tick \[mm\], by set of unknowns; and
-    /// the ticks in which the first set's current limit stops or frees the integrator.
-    pub(super) fn run(&self, command_mm_s: &[f64], each: &mut dyn FnMut(usize, &Lane)) -> Vec<usize> {
+    /// Drives an axis that starts at rest at 0; `each` has the state at the start of every tick, and may change it. The ticks in
+    /// which the first set's current limit stops or frees the integrator.
+    pub(super) fn run(&self, command_mm_s: &[f64], each: &mut dyn FnMut(usize, &mut State)) -> Vec<usize> {
         let Self { model, whole_ticks, substeps, .. } = self;
         let mut state = State::default();
         let mut moments = Vec::new();
         for tick in 0..command_mm_s.len() {
-            each(tick, &state.position);
+            each(tick, &mut state);
             let delayed = model.delayed(command_mm_s, tick);
             if whole_ticks.as_ref().is_some_and(|whole| whole.advance(model, &mut state, &delayed)) {
                 #[cfg(test)]
@@ -304,7 +304,7 @@ mod tests {
             let mut worst_mm = 0.0_f64;
             let moments = Simulation::new(&[unknowns, other, other, unknowns], 5e-4, SUBSTEPS).run(
                 &command,
-                &mut |tick, at| {
+                &mut |tick, State { position: at, .. }| {
                     worst_mm = worst_mm.max((at[0] - expected[tick]).abs());
                     assert_eq!(at[0].to_bits(), at[3].to_bits());
                 },
@@ -348,10 +348,10 @@ mod tests {
             let mut simulation = Simulation::new(&lanes, 5e-4, SUBSTEPS);
             let mut positions = [Vec::new(), Vec::new()];
             let [by_ticks, by_steps] = &mut positions;
-            let moments = simulation.run(&command, &mut |_, at| by_ticks.push(*at));
+            let moments = simulation.run(&command, &mut |_, state| by_ticks.push(state.position));
             ticks_whole += simulation.ticks_whole.get();
             simulation.whole_ticks = None;
-            assert_eq!(simulation.run(&command, &mut |_, at| by_steps.push(*at)), moments);
+            assert_eq!(simulation.run(&command, &mut |_, state| by_steps.push(state.position)), moments);
             for (tick, (at, expected)) in by_ticks.iter().zip(by_steps).enumerate() {
                 for (at, expected) in at.iter().zip(expected) {
                     let off_mm = (at - *expected).abs();

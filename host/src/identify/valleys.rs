@@ -1,0 +1,177 @@
+//! From the end of a search: on along the floor of its valley, and over to valleys that answer alike.
+//!
+//! A search stops where a floor is flat or curved, and ends in the nearest valley. Poles of the drive can be exchanged
+//! with hardly another answer, so each exchange is a place to search from, and so is each valley that is found in this
+//! way. What leads back to a valley that is known is left early.
+
+use super::cholesky::Symmetric;
+use super::confidence::floor;
+use super::parameters::{Unknown, Unknowns};
+use super::readings::{Precision, Runs};
+use super::search::{Effort, Found, LAST_EFFORT, derivatives, is_met, search};
+
+pub(super) const EXCHANGED_EFFORT: Effort =
+    Effort { precision: Precision::LAST, jacobians: 4, least_gain: 10.0 };
+/// A valley that is this much worse after a few steps is left; one that is this much worse at its end is a rival,
+/// which chance prefers in one of a hundred cases.
+pub(super) const NEAR: f64 = 3e4;
+const RIVAL: f64 = 9.0;
+/// Difference in misfit below which more search may still decide.
+pub(super) const UNDECIDED: f64 = 1e3;
+/// Misfit for each reading beyond which a model has no valley worth looking beside.
+const LOST: f64 = 100.0;
+/// Most valleys that answer alike.
+const VALLEYS_MAX: usize = 6;
+/// A parabola tells the rise of misfit within its valley to this factor, and to what searches leave.
+const PARABOLA: f64 = 4.0;
+const SAME: f64 = 1.0;
+
+pub(super) const SETTLING_EFFORT: Effort = Effort { jacobians: 5, ..LAST_EFFORT };
+
+/// Kicks along the floor, in standard deviations, and the gain in misfit for which what follows is searched.
+const KICKS: [f64; 4] = [-30.0, -9.0, 9.0, 30.0];
+const KICKED_EFFORT: Effort = Effort { precision: Precision::LAST, jacobians: 2, least_gain: 10.0 };
+const KICK_GAIN: f64 = 0.5;
+/// The same where the model does not follow: the floor is curved there, and a search stops far from its end.
+const FAR_KICKS: [f64; 6] = [-100.0, -30.0, -9.0, 9.0, 30.0, 100.0];
+const FAR_EFFORT: Effort = Effort { jacobians: 6, ..KICKED_EFFORT };
+/// Most kicks after each other.
+const KICKED_ROUNDS: usize = 4;
+
+/// What was found by the last stages, or better if there is better near it; with its rivals.
+pub(super) fn finished(runs: &Runs, found: Found, free: &[Unknown]) -> Option<Found> {
+    if found.misfit() > LOST * runs.readings() {
+        return Some(found);
+    }
+    // What answers alike is looked for from where the model follows, if it does anywhere.
+    let found = if is_met(runs, &found) { found } else { kicked(runs, found, free)? };
+    let found = with_rivals(runs, found, free)?;
+    if is_met(runs, &found) { kicked(runs, found, free) } else { Some(found) }
+}
+
+/// What was found, or better if the search had stopped on its way along the floor of a valley. What follows may stop
+/// there, too. Places where searches along the floor end, and that are hardly worse, are rivals: the floor is flat, and
+/// rough.
+fn kicked(runs: &Runs, mut found: Found, free: &[Unknown]) -> Option<Found> {
+    for _ in 0..KICKED_ROUNDS {
+        let valley = Valley::of(runs, found.clone(), free)?;
+        let ends = along(runs, &valley, free)?;
+        let near = ends.iter().min_by(|a, b| a.misfit().total_cmp(&b.misfit()));
+        match near.filter(|near| near.misfit() < found.misfit() - KICK_GAIN) {
+            Some(near) => {
+                let last = search(runs, near.unknowns, free, LAST_EFFORT)?;
+                found = Found { rivals: found.rivals, ..last };
+            }
+            None => {
+                let is_rival =
+                    |end: &&Found| end.misfit() < found.misfit() + RIVAL && !valley.holds(end, free);
+                let rivals: Vec<Unknowns> = ends.iter().filter(is_rival).map(|end| end.unknowns).collect();
+                found.rivals.extend(rivals);
+                break;
+            }
+        }
+    }
+    Some(found)
+}
+
+/// Where searches end that begin along the floor of the valley.
+fn along(runs: &Runs, valley: &Valley, free: &[Unknown]) -> Option<Vec<Found>> {
+    let lag_limit_s = runs.lag_limit_s();
+    let floor = floor(&valley.information, free)?;
+    let start = |deviations: &f64| {
+        let steps = free.iter().zip(&floor);
+        let moved = steps
+            .fold(valley.end.unknowns, |start, (&unknown, step)| start.shifted(unknown, deviations * step));
+        moved.bounded(free, lag_limit_s)
+    };
+    let from = |kicks: &[f64], effort: Effort| {
+        kicks.iter().filter_map(|by| search(runs, start(by), free, effort)).collect()
+    };
+    let is_met = is_met(runs, &valley.end);
+    Some(if is_met { from(&KICKS, KICKED_EFFORT) } else { from(&FAR_KICKS, FAR_EFFORT) })
+}
+
+/// A valley with its lowest known place.
+struct Valley {
+    end: Found,
+    /// The curvature of its floor, by free unknown.
+    information: Symmetric,
+}
+
+impl Valley {
+    fn of(runs: &Runs, end: Found, free: &[Unknown]) -> Option<Self> {
+        let (columns, residuals) = derivatives(runs, &end.unknowns, free, Precision::LAST)?;
+        let information = runs.weights(Precision::LAST).sums(&columns, &residuals).normal;
+        Some(Self { end, information })
+    }
+
+    /// By how much a place is worse than the end, if the floor is a parabola.
+    fn rise(&self, to: &Unknowns, free: &[Unknown]) -> f64 {
+        let off: Vec<f64> = free.iter().map(|unknown| unknown.distance(&self.end.unknowns, to)).collect();
+        let row = |row: usize| -> f64 {
+            off.iter().enumerate().map(|(column, by)| self.information.at(row, column) * by).sum()
+        };
+        off.iter().enumerate().map(|(index, by)| by * row(index)).sum()
+    }
+
+    /// Whether a place lies in the valley: no higher than it can be there.
+    fn holds(&self, place: &Found, free: &[Unknown]) -> bool {
+        let higher = (place.misfit() - self.end.misfit()).max(0.0);
+        self.rise(&place.unknowns, free) < PARABOLA * higher + SAME
+    }
+}
+
+/// The least of what was found and of the valleys that answer alike; those that are hardly worse are its rivals.
+pub(super) fn with_rivals(runs: &Runs, found: Found, free: &[Unknown]) -> Option<Found> {
+    let lag_limit_s = runs.lag_limit_s();
+    let first = found.misfit();
+    let mut valleys = vec![Valley::of(runs, found, free)?];
+    let mut next = 0;
+    while next < valleys.len() && valleys.len() < VALLEYS_MAX {
+        let near = &valleys[next].end;
+        next += 1;
+        // What answers alike may be reached only from what answers alike, but not from far off.
+        if near.misfit() > first + UNDECIDED {
+            continue;
+        }
+        for start in near.unknowns.exchanged() {
+            let is_known = |place: &Found| {
+                let is_back =
+                    |valley: &Valley| place.misfit() >= valley.end.misfit() && valley.holds(place, free);
+                valleys.iter().any(is_back)
+            };
+            let begun = search(runs, start.bounded(free, lag_limit_s), free, EXCHANGED_EFFORT);
+            let begun = begun.filter(|begun| begun.misfit() < first + NEAR && !is_known(begun));
+            let Some(end) = begun.and_then(|begun| search(runs, begun.unknowns, free, LAST_EFFORT)) else {
+                continue;
+            };
+            match valleys.iter_mut().find(|valley| valley.holds(&end, free)) {
+                Some(valley) if end.misfit() < valley.end.misfit() => valley.end = end,
+                Some(_) => {}
+                None => valleys.extend(Valley::of(runs, end, free)),
+            }
+        }
+    }
+    ranked(valleys)
+}
+
+/// The lowest of valleys, with those as rivals that are hardly worse.
+fn ranked(mut valleys: Vec<Valley>) -> Option<Found> {
+    valleys.sort_by(|a, b| a.end.misfit().total_cmp(&b.end.misfit()));
+    let mut ends = valleys.into_iter().map(|valley| valley.end);
+    let mut best = ends.next()?;
+    let is_rival = |other: &Found| other.misfit() < best.misfit() + RIVAL;
+    best.rivals = ends.filter(is_rival).map(|other| other.unknowns).collect();
+    Some(best)
+}
+
+/// What was found and its rivals, searched once more: of readings that were grouped anew.
+pub(super) fn settled(runs: &Runs, found: &Found, free: &[Unknown]) -> Option<Found> {
+    let mut valleys = vec![Valley::of(runs, search(runs, found.unknowns, free, SETTLING_EFFORT)?, free)?];
+    for rival in &found.rivals {
+        let end = search(runs, *rival, free, SETTLING_EFFORT);
+        let end = end.filter(|end| !valleys.iter().any(|valley| valley.holds(end, free)));
+        valleys.extend(end.and_then(|end| Valley::of(runs, end, free)));
+    }
+    ranked(valleys)
+}
