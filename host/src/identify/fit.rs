@@ -14,7 +14,7 @@ use super::readings::{Precision, Runs, dot};
 use super::recording::{AxisRecording, span};
 use super::search::{Effort, Found, LAST_EFFORT, is_met, least, search};
 use super::simulation::SUBSTEPS;
-use super::valleys::{self, EXCHANGED_EFFORT, NEAR, SETTLING_EFFORT, UNDECIDED, finished, with_rivals};
+use super::valleys::{self, EXCHANGED_EFFORT, NEAR, SETTLING_EFFORT, UNDECIDED, finished};
 use super::{AxisParametersFound, BedEstimate, Estimate, IdentifyError, RunMatch};
 
 /// Starts of the grid: velocity gain \[1/s\], integral time \[s\], lag \[ticks\] ...
@@ -72,8 +72,8 @@ const OTHER_JACOBIANS: usize = 3;
 const OTHERS: usize = 2;
 
 /// A bed must lower the misfit by what its three unknowns are worth by themselves, three logarithms of the number of
-/// readings (Schwarz), and by as much again as chance does in one of e¹⁵ cases.
-const BED_GAIN: f64 = 30.0;
+/// readings (Schwarz), and by as much again as chance does in one of e⁶ cases.
+const BED_GAIN: f64 = 12.0;
 
 /// Two searches for one minimum end this far apart: positions are stairs where the limit acts, if low ones.
 const STAIRS: f64 = 10.0;
@@ -142,21 +142,33 @@ impl Stages {
         Some(if is_better { (other, &ALL) } else { model })
     }
 
+    /// By how much a bed lowers the misfit, for one of each reading.
+    fn gain(&self, rigid: &Found, bed: &Found) -> f64 {
+        let each = (bed.misfit() / self.readings()).max(1.0);
+        (rigid.misfit() - bed.misfit()) / each
+    }
+
     /// Whether the misfits tell a bed from chance.
     fn is_bed(&self, rigid: &Found, bed: &Found) -> bool {
-        let each = (bed.misfit() / self.readings()).max(1.0);
-        (rigid.misfit() - bed.misfit()) / each > 3.0 * self.readings().ln() + BED_GAIN
+        self.gain(rigid, bed) > 3.0 * self.readings().ln() + BED_GAIN
     }
 
     /// Where the rigid model follows in the middle: a bed, if its remainder promises one.
     fn rigid_first(&mut self, middle: &Found) -> Option<Model> {
         self.runs.regroup(&middle.unknowns, SUBSTEPS);
-        let rigid = finished(&self.runs, self.last(middle.unknowns, without_bed())?, without_bed())?;
+        let rigid = self.last(middle.unknowns, without_bed())?;
+        self.beside(rigid, None)
+    }
+
+    /// The rigid model, or a bed beside it: one that its remainder promises, or the `known` one.
+    fn beside(&self, rigid: Found, known: Option<Found>) -> Option<Model> {
+        let rigid = finished(&self.runs, rigid, without_bed())?;
         let starts = likely_beds(&self.runs, &rigid, Precision::LAST);
         // What is promised is linear; a search may find more.
         let promising = starts.into_iter().take(BEDS).filter(|(_, gain)| *gain > PROMISE);
-        let bed = least(promising.filter_map(|(start, _)| search(&self.runs, start, &ALL, LAST_EFFORT)));
-        Some(match bed.and_then(|bed| with_rivals(&self.runs, bed, &ALL)) {
+        let found = promising.filter_map(|(start, _)| search(&self.runs, start, &ALL, LAST_EFFORT));
+        let bed = least(found.chain(known)).filter(|bed| self.gain(&rigid, bed) > PROMISE);
+        Some(match bed.and_then(|bed| finished(&self.runs, bed, &ALL)) {
             Some(bed) if self.is_bed(&rigid, &bed) => (bed, &ALL),
             _ => (rigid, without_bed()),
         })
@@ -187,15 +199,18 @@ impl Stages {
         self.decided(rigid, bed)
     }
 
-    /// With a bed or without. The one that is behind is not finished where that can't decide any more.
+    /// With a bed or without. The one that is far behind is not finished.
     fn decided(&self, mut rigid: Found, mut bed: Found) -> Option<Model> {
-        let gap = (rigid.misfit() - bed.misfit()).abs();
-        let is_lost = |behind: &Found| gap > if is_met(&self.runs, behind) { UNDECIDED } else { NEAR };
-        let is_bed = self.is_bed(&rigid, &bed);
-        if !is_bed || !is_lost(&rigid) {
+        let ahead = rigid.misfit() - bed.misfit();
+        let is_met = is_met(&self.runs, &rigid);
+        if is_met && ahead < UNDECIDED {
+            return self.beside(rigid, Some(bed));
+        }
+        let (is_bed, is_near) = (self.is_bed(&rigid, &bed), ahead.abs() < NEAR);
+        if !is_bed || (is_near && !is_met) {
             rigid = finished(&self.runs, rigid, without_bed())?;
         }
-        if is_bed || !is_lost(&bed) {
+        if is_bed || is_near {
             bed = finished(&self.runs, bed, &ALL)?;
         }
         Some(if self.is_bed(&rigid, &bed) { (bed, &ALL) } else { (rigid, without_bed()) })

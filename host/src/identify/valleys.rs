@@ -53,14 +53,18 @@ pub(super) fn finished(runs: &Runs, found: Found, free: &[Unknown]) -> Option<Fo
 /// there, too. Places where searches along the floor end, and that are hardly worse, are rivals: the floor is flat, and
 /// rough.
 fn kicked(runs: &Runs, mut found: Found, free: &[Unknown]) -> Option<Found> {
+    let mut is_under_way = false;
     for _ in 0..KICKED_ROUNDS {
         let valley = Valley::of(runs, found.clone(), free)?;
         let ends = along(runs, &valley, free)?;
         let near = ends.iter().min_by(|a, b| a.misfit().total_cmp(&b.misfit()));
         match near.filter(|near| near.misfit() < found.misfit() - KICK_GAIN) {
             Some(near) => {
-                let last = search(runs, near.unknowns, free, LAST_EFFORT)?;
-                found = Found { rivals: found.rivals, ..last };
+                // Before the model follows, the next kick goes on from there at once.
+                is_under_way = !is_met(runs, near);
+                let next =
+                    if is_under_way { near.clone() } else { search(runs, near.unknowns, free, LAST_EFFORT)? };
+                found = Found { rivals: found.rivals, ..next };
             }
             None => {
                 let is_rival =
@@ -70,6 +74,9 @@ fn kicked(runs: &Runs, mut found: Found, free: &[Unknown]) -> Option<Found> {
                 break;
             }
         }
+    }
+    if is_under_way {
+        found = Found { rivals: found.rivals, ..search(runs, found.unknowns, free, LAST_EFFORT)? };
     }
     Some(found)
 }
@@ -122,7 +129,7 @@ impl Valley {
 }
 
 /// The least of what was found and of the valleys that answer alike; those that are hardly worse are its rivals.
-pub(super) fn with_rivals(runs: &Runs, found: Found, free: &[Unknown]) -> Option<Found> {
+fn with_rivals(runs: &Runs, found: Found, free: &[Unknown]) -> Option<Found> {
     let lag_limit_s = runs.lag_limit_s();
     let first = found.misfit();
     let mut valleys = vec![Valley::of(runs, found, free)?];
