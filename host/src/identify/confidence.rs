@@ -286,6 +286,8 @@ impl Confidence {
 
 #[cfg(test)]
 mod tests {
+    use super::super::fixtures::{TICK_S, recorded, sticking};
+    use super::super::simulation::SUBSTEPS;
     use super::*;
 
     #[test]
@@ -320,6 +322,28 @@ mod tests {
         let scatter = scatter_of_sums(&[noise]);
         assert!((0.9..1.1).contains(&scatter), "{scatter}");
         assert_eq!(scatter_of_sums(&[Vec::new(), vec![0.0; 5]]), 1.0);
+    }
+
+    /// A quiet axis that does not move by whole counts from tick to tick: intervals are those of readings whose errors make each other
+    /// good, but not where the model does not follow.
+    #[test]
+    fn intervals_of_a_quiet_axis_are_narrower() {
+        const RESOLUTION_MM: f64 = 1e-3;
+        let unknowns = sticking();
+        let feed = |tick: usize| 40.0 * libm::sin(core::f64::consts::TAU * 3.0 * TICK_S * tick as f64);
+        let run = recorded(&unknowns, (0..4000).map(feed).collect(), RESOLUTION_MM);
+        let mut runs = Runs::new(&[run], RESOLUTION_MM);
+        runs.regroup(&unknowns, SUBSTEPS);
+        let residuals = runs.residuals(&[unknowns], SUBSTEPS).remove(0).expect("numbers");
+        let misfits = runs.weights(Precision::LAST).misfits(&residuals);
+        let found = Found { unknowns, residuals, misfits, rivals: Vec::new() };
+        let free = [Unknown::Gain, Unknown::Offset, Unknown::Lag];
+        let half_width = |left: f64| {
+            let confidence = confidence(&mut runs.clone(), &found, &free, left).expect("a confidence");
+            confidence.estimate(|unknowns| unknowns.get(Unknown::Gain)).half_width_95
+        };
+        let part = half_width(0.0) / half_width(f64::MIN_POSITIVE);
+        assert!((SCATTER_MIN.sqrt() - 1e-9..0.8).contains(&part), "{part}");
     }
 
     #[test]

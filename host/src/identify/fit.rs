@@ -8,13 +8,12 @@ use super::bed::likely_beds;
 use super::cholesky::Symmetric;
 use super::confidence::{Confidence, confidence};
 use super::differences::Parabolas;
-use super::estimate::MET;
 use super::parameters::{ALL, Unknown, Unknowns, without_bed};
 use super::readings::{Precision, Runs, dot};
 use super::recording::{AxisRecording, span};
 use super::search::{Effort, Found, LAST_EFFORT, is_met, least, search};
 use super::simulation::SUBSTEPS;
-use super::valleys::{self, EXCHANGED_EFFORT, NEAR, SETTLING_EFFORT, UNDECIDED, finished};
+use super::valleys::{EXCHANGED_EFFORT, NEAR, SETTLING_EFFORT, UNDECIDED, finished, settled};
 use super::{AxisParametersFound, BedEstimate, Estimate, IdentifyError, RunMatch};
 
 /// Starts of the grid: velocity gain \[1/s\], integral time \[s\], lag \[ticks\] ...
@@ -59,7 +58,7 @@ const FINE_EFFORT: Effort =
 
 /// Beds that are followed.
 const BEDS: usize = 3;
-/// Promised gain in misfit from which a bed is searched for.
+/// Gain in misfit from which a promised bed is searched for, and one that was found is finished.
 const PROMISE: f64 = 12.0;
 /// Misfit for each reading from which what was found may be a false minimum: that of a right model scatters by some
 /// hundredths.
@@ -69,17 +68,19 @@ const FOLLOWED_WELL: f64 = 1.05;
 const OTHER_BEDS_HZ: [f64; 9] = [5.5, 8.0, 12.0, 17.0, 25.0, 36.0, 52.0, 75.0, 108.0];
 const OTHER_BED: (f64, f64) = (0.03, 0.05);
 const OTHER_JACOBIANS: usize = 3;
+/// Those that are followed, and the logarithm of two frequencies' ratio below which they are one.
 const OTHERS: usize = 2;
+const SAME_FREQUENCY: f64 = 0.2;
 
 /// A bed must lower the misfit by what its three unknowns are worth by themselves, three logarithms of the number of
-/// readings (Schwarz), and by as much again as chance does in one of e⁶ cases.
+/// readings (Schwarz), and by 12 more: chance gives two unknowns as much in one of e⁶ cases.
 const BED_GAIN: f64 = 12.0;
 
 /// Two searches for one minimum end this far apart: positions are stairs where the limit acts, if low ones.
 const STAIRS: f64 = 10.0;
 
-/// Mass ratio of a bed without which nothing followed.
-const CERTAIN_RATIO: f64 = 1e-3;
+/// Mass ratio below which a bed is none: it moves the axis by less than what the model leaves out.
+const LEAST_RATIO: f64 = 2e-3;
 
 /// Root mean square of the residuals over the travel, above which the model is none.
 const MISS_MAX: f64 = 0.05;
@@ -97,7 +98,7 @@ pub(super) fn fit(recordings: &[AxisRecording], resolution_mm: f64) -> Result<Fi
     let too_late = IdentifyError::TooLate { limit_s: search.runs.lag_limit_s() };
     let starts = coarse(recordings, resolution_mm)?;
     let (found, free) = search.best(&starts).ok_or(too_late.clone())?;
-    settled(recordings, search.runs, found, free).ok_or(too_late)?
+    concluded(recordings, search.runs, &found, free).ok_or(too_late)?
 }
 
 /// A model that was found, and its unknowns.
@@ -128,18 +129,42 @@ impl Stages {
         let rough = least(starts.iter().filter_map(|start| self.stage(*start, without_bed(), ROUGH_EFFORT)))?;
         self.runs.regroup(&rough.unknowns, ROUGH_EFFORT.precision.substeps);
         let middle = self.stage(rough.unknowns, without_bed(), MIDDLE_EFFORT)?;
-        let is_rigid = middle.misfit() < MET * self.readings();
+        let is_rigid = is_met(&self.runs, &middle);
         let model = if is_rigid { self.rigid_first(&middle) } else { self.bed_first(&middle) }?;
         if model.0.misfit() < FOLLOWED_WELL * self.readings() {
             return Some(model);
         }
-        let Some(other) = self.other_beds(starts) else { return Some(model) };
+        let Some(bed) = self.other_beds(starts) else { return Some(model) };
         // Readings were grouped anew.
-        let misfits = model.0.misfits_of(&self.runs)?;
-        let before = Found { misfits, ..model.0.clone() };
-        let has_bed = model.1.len() == ALL.len();
-        let is_better = if has_bed { other.misfit() < before.misfit() } else { self.is_bed(&before, &other) };
-        Some(if is_better { (other, &ALL) } else { model })
+        let before = (settled(&self.runs, &model.0, model.1)?, model.1);
+        let other = match self.rigid_from(&bed) {
+            Some(rigid) => self.decided(rigid, bed),
+            None => finished(&self.runs, bed, &ALL).map(|bed| (bed, &ALL[..])),
+        };
+        Some(match other {
+            Some(other) => self.better(before, other),
+            None => before,
+        })
+    }
+
+    /// The one that explains more; a bed has to explain enough.
+    fn better(&self, one: Model, other: Model) -> Model {
+        let has_bed = |model: &Model| model.1.len() == ALL.len();
+        let is_other = match (has_bed(&one), has_bed(&other)) {
+            (false, true) => self.is_bed(&one.0, &other.0),
+            (true, false) => !self.is_bed(&other.0, &one.0),
+            _ => other.0.misfit() < one.0.misfit(),
+        };
+        if is_other { other } else { one }
+    }
+
+    /// The rigid model as it is found from a bed, where it is not far worse.
+    fn rigid_from(&self, bed: &Found) -> Option<Found> {
+        let mut start = bed.unknowns;
+        start.set(Unknown::BedMassRatio, 0.0);
+        let near = search(&self.runs, start, without_bed(), EXCHANGED_EFFORT)?;
+        let is_near = near.misfit() < bed.misfit() + NEAR;
+        if is_near { search(&self.runs, near.unknowns, without_bed(), LAST_EFFORT) } else { None }
     }
 
     /// By how much a bed lowers the misfit, for one of each reading.
@@ -150,7 +175,8 @@ impl Stages {
 
     /// Whether the misfits tell a bed from chance.
     fn is_bed(&self, rigid: &Found, bed: &Found) -> bool {
-        self.gain(rigid, bed) > 3.0 * self.readings().ln() + BED_GAIN
+        let is_heavy = bed.unknowns.get(Unknown::BedMassRatio) > LEAST_RATIO;
+        is_heavy && self.gain(rigid, bed) > 3.0 * self.readings().ln() + BED_GAIN
     }
 
     /// Where the rigid model follows in the middle: a bed, if its remainder promises one.
@@ -183,23 +209,20 @@ impl Stages {
         let Some(bed) = bed else { return self.rigid_first(middle) };
         self.runs.regroup(&bed.unknowns, SUBSTEPS);
         let bed = self.last(bed.unknowns, &ALL)?;
-        let mut start = bed.unknowns;
-        start.set(Unknown::BedMassRatio, 0.0);
-        let beside = search(&self.runs, start, without_bed(), EXCHANGED_EFFORT);
-        let beside = beside.filter(|beside| beside.misfit() < bed.misfit() + NEAR);
+        let beside = self.rigid_from(&bed);
         if is_met(&self.runs, &bed)
-            && bed.unknowns.get(Unknown::BedMassRatio) > CERTAIN_RATIO
+            && bed.unknowns.get(Unknown::BedMassRatio) > LEAST_RATIO
             && beside.is_none()
         {
             // The rigid model misses it by far, wherever it starts.
             return Some((finished(&self.runs, bed, &ALL)?, &ALL));
         }
-        let beside = beside.and_then(|near| search(&self.runs, near.unknowns, without_bed(), LAST_EFFORT));
         let rigid = least([self.last(middle.unknowns, without_bed()), beside].into_iter().flatten())?;
         self.decided(rigid, bed)
     }
 
-    /// With a bed or without. The one that is far behind is not finished.
+    /// With a bed or without. A rigid model that follows, and is not far behind, is looked beside; else the one that is far
+    /// behind is not finished.
     fn decided(&self, mut rigid: Found, mut bed: Found) -> Option<Model> {
         let ahead = rigid.misfit() - bed.misfit();
         let is_met = is_met(&self.runs, &rigid);
@@ -230,13 +253,23 @@ impl Stages {
             }
         }
         found.sort_by(|a, b| a.misfit().total_cmp(&b.misfit()));
-        let followed = found.iter().take(OTHERS).filter_map(|found| {
+        // Neighbours end where the best ends.
+        let frequency_hz = |found: &Found| found.unknowns.get(Unknown::BedFrequency);
+        let mut distinct: Vec<&Found> = Vec::new();
+        for found in &found {
+            let is_same =
+                |other: &&Found| (frequency_hz(other) / frequency_hz(found)).ln().abs() < SAME_FREQUENCY;
+            if !distinct.iter().any(is_same) {
+                distinct.push(found);
+            }
+        }
+        let followed = distinct.into_iter().take(OTHERS).filter_map(|found| {
             let rough = search(&self.runs, found.unknowns, &ALL, ROUGH_EFFORT)?;
             self.stage(rough.unknowns, &ALL, MIDDLE_EFFORT)
         });
         let middle = least(followed)?;
         self.runs.regroup(&middle.unknowns, SUBSTEPS);
-        finished(&self.runs, self.last(middle.unknowns, &ALL)?, &ALL)
+        self.last(middle.unknowns, &ALL)
     }
 }
 
@@ -258,21 +291,20 @@ fn limited(runs: &Runs, start: Unknowns, accel_mm_s2: f64, precision: Precision)
 }
 
 /// The end: weights by what the model follows, and intervals.
-fn settled(
+fn concluded(
     recordings: &[AxisRecording],
     mut runs: Runs,
-    mut found: Found,
+    found: &Found,
     free: &[Unknown],
 ) -> Option<Result<Fit, IdentifyError>> {
     runs.regroup(&found.unknowns, SUBSTEPS);
-    let misfits = found.misfits_of(&runs)?;
-    let readings = runs.readings();
-    let misfit: f64 = misfits.iter().sum();
-    let is_met = misfit < MET * readings;
+    let mut found = settled(&runs, found, free)?;
+    let (misfit, readings) = (found.misfit(), runs.readings());
+    let is_met = is_met(&runs, &found);
     if is_met {
-        runs.rescale(&misfits);
+        runs.rescale(&found.misfits);
+        found = Found { rivals: found.rivals, ..search(&runs, found.unknowns, free, SETTLING_EFFORT)? };
     }
-    found = valleys::settled(&runs, &found, free)?;
     if let Some(simpler) = without_filter(&runs, &found, free) {
         found = simpler;
     }

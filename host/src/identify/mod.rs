@@ -69,6 +69,8 @@ mod fit;
 mod estimate;
 mod display;
 mod screw;
+#[cfg(test)]
+mod fixtures;
 
 pub use display::Described;
 pub use error::IdentifyError;

@@ -46,42 +46,42 @@ struct Nudge {
 }
 
 impl Motion<'_> {
-    /// The offsets for every tick \[mm\], of a standard deviation of 1 for a drive's step of 1 s.
+    /// The offsets for every tick, each of a standard deviation of 1 \[mm\].
     pub(super) fn offsets(&self) -> Vec<Vec<f64>> {
         let Self { unknowns, tick_s, .. } = *self;
         let step_s = unknowns.step_s();
         let limit_mm_s2 = unknowns.get(Unknown::AccelLimit);
         let late_ticks = (unknowns.get(Unknown::Lag) / tick_s) as usize;
-        let size_s = RECURRING * UNIFORM.sqrt() * step_s;
+        let off_s = RECURRING * UNIFORM.sqrt() * step_s;
         // A step of the integrator is Kv/Ti·h·(limit/Kv).
-        let integral_mm_s2 = size_s * limit_mm_s2 / unknowns.get(Unknown::IntegralTime);
+        let integral_mm_s2 = off_s * limit_mm_s2 / unknowns.get(Unknown::IntegralTime);
         let limited = self.limited.iter().map(|&tick| Nudge { tick, integral_mm_s2, velocity_mm_s: 0.0 });
-        let turned_mm_s = size_s * TURN * unknowns.get(Unknown::Coulomb);
+        let turned_mm_s = off_s * TURN * unknowns.get(Unknown::Coulomb);
         let turns = self.turns().into_iter().map(|(tick, sign)| Nudge {
             tick,
             integral_mm_s2: 0.0,
             velocity_mm_s: sign * turned_mm_s,
         });
-        let mut offsets = self.shared(&limited.collect::<Vec<_>>(), step_s);
-        offsets.extend(self.shared(&turns.collect::<Vec<_>>(), step_s));
+        let mut offsets = self.shared(&limited.collect::<Vec<_>>());
+        offsets.extend(self.shared(&turns.collect::<Vec<_>>()));
         offsets.extend(self.jumps(late_ticks, LIMITING * limit_mm_s2 / unknowns.get(Unknown::VelocityGain)));
         offsets
     }
 
-    /// One offset for each of the moments, or for several of them: by what the model answers, divided by `step_s`. An axis may
-    /// stop and start again behind a moment, which no closed form tells.
-    fn shared(&self, moments: &[Nudge], step_s: f64) -> Vec<Vec<f64>> {
+    /// One offset for each of the moments, or for several of them, as the model answers: an axis may stop and start again behind
+    /// a moment, which no closed form tells.
+    fn shared(&self, moments: &[Nudge]) -> Vec<Vec<f64>> {
         let each = moments.len().div_ceil(OFFSETS_MAX).max(1);
         let all: Vec<&[Nudge]> = moments.chunks(each).collect();
-        all.chunks(LANES).flat_map(|lanes| self.answers(lanes, step_s)).collect()
+        all.chunks(LANES).flat_map(|lanes| self.answers(lanes)).collect()
     }
 
-    /// By how much the axis is ahead behind the moments of up to [`LANES`] offsets, divided by `step_s`.
-    fn answers(&self, lanes: &[&[Nudge]], step_s: f64) -> Vec<Vec<f64>> {
+    /// By how much the axis is ahead behind the moments of up to [`LANES`] offsets \[mm\].
+    fn answers(&self, lanes: &[&[Nudge]]) -> Vec<Vec<f64>> {
         let mut offsets = vec![Vec::with_capacity(self.positions_mm.len()); lanes.len()];
         self.simulation.run(self.command_mm_s, &mut |tick, state| {
             for (lane, (offset, nudges)) in offsets.iter_mut().zip(lanes).enumerate() {
-                offset.push((state.position[lane] - self.positions_mm[tick]) / step_s);
+                offset.push(state.position[lane] - self.positions_mm[tick]);
                 for nudge in nudges.iter().filter(|nudge| nudge.tick == tick) {
                     state.integral[lane] += nudge.integral_mm_s2;
                     state.velocity[lane] += nudge.velocity_mm_s;
@@ -126,12 +126,12 @@ impl Motion<'_> {
             return Vec::new();
         }
         let ends = starts.iter().copied().skip(1).chain([ticks]);
-        let size = (TOGETHER * UNIFORM).sqrt();
+        let off_s = (TOGETHER * UNIFORM).sqrt() * self.unknowns.step_s();
         let of = |(start, end): (usize, usize)| {
             let before = self.velocity_mm_s(start.saturating_sub(1));
             let ahead = |tick: usize| {
                 let until = tick.min(end.saturating_sub(1));
-                if tick < start { 0.0 } else { size * (self.velocity_mm_s(until) - before) }
+                if tick < start { 0.0 } else { off_s * (self.velocity_mm_s(until) - before) }
             };
             (0..ticks).map(ahead).collect()
         };
@@ -141,58 +141,31 @@ impl Motion<'_> {
 
 #[cfg(test)]
 mod tests {
-    use hal_sim::{DriveModel, DriveState};
-
-    use super::super::parameters::Unknowns;
+    use super::super::fixtures::{recorded, sticking};
     use super::super::readings::{Precision, Runs};
-    use super::super::recording::AxisRecording;
     use super::super::simulation::SUBSTEPS;
-    use super::*;
 
     /// A drive that is driven to its limit, whose axis stops between two jumps and starts again by itself: what the model of
     /// the true values leaves is explained by the drive's clock, reading by reading.
     #[test]
     fn what_the_clock_leaves_is_explained() {
         const RESOLUTION_MM: f64 = 5e-5;
-        let mut unknowns = Unknowns::zero(2.5e-5);
-        for (unknown, value) in [
-            (Unknown::Gain, 1.0),
-            (Unknown::VelocityGain, 193.8),
-            (Unknown::IntegralTime, 0.019_73),
-            (Unknown::AccelLimit, 15_884.0),
-            (Unknown::Coulomb, 1612.0),
-            (Unknown::Viscous, 0.17),
-            (Unknown::BedFrequency, 6.07),
-            (Unknown::BedDamping, 0.0063),
-            (Unknown::BedMassRatio, 0.133),
-        ] {
-            unknowns.set(unknown, value);
-        }
-        unknowns.set_lags(4.843e-5, 1.082e-4, 1.229e-4);
-        let tick_s = 5e-4;
+        let unknowns = sticking();
         let feed = |tick: usize| match tick {
             400..1200 => 99.996,
             1600..2400 => -99.996,
             _ => 0.0,
         };
-        let command_mm_s: Vec<f64> = (0..3200).map(feed).collect();
-        let model = DriveModel::new(unknowns.drive(), tick_s, SUBSTEPS).expect("a drive");
-        let mut state = DriveState::<64>::at_rest(&model, 10.6165).expect("at rest");
-        let mut actual_mm = Vec::new();
-        for command_mm_s in &command_mm_s {
-            actual_mm.push((state.position_mm() / RESOLUTION_MM).round() * RESOLUTION_MM);
-            model.tick(&mut state, *command_mm_s);
-        }
-        let run = AxisRecording { tick_s, command_mm_s, actual_mm, ..Default::default() };
+        let run = recorded(&unknowns, (0..3200).map(feed).collect(), RESOLUTION_MM);
         let mut runs = Runs::new(&[run], RESOLUTION_MM);
         runs.regroup(&unknowns, SUBSTEPS);
         let residuals = runs.residuals(&[unknowns], SUBSTEPS).remove(0).expect("numbers");
         let whitened = runs.weights(Precision::LAST).whitened(&residuals).remove(0);
         let worst = whitened.iter().fold(0.0_f64, |worst, value| worst.max(value.abs()));
-        // Errors of rounding end at the root of 3, and offsets are not always the ones that were.
+        // Errors of rounding end at the root of 3 standard deviations; the rest is left to what offsets do not tell.
         assert!(worst < 3.0, "{worst} standard deviations");
-        let least_mm = residuals[0].iter().fold(f64::INFINITY, |least, value| least.min(*value));
-        let greatest_mm = residuals[0].iter().fold(f64::NEG_INFINITY, |most, value| most.max(*value));
+        let least_mm = residuals[0].iter().copied().fold(f64::INFINITY, f64::min);
+        let greatest_mm = residuals[0].iter().copied().fold(f64::NEG_INFINITY, f64::max);
         assert!(
             greatest_mm - least_mm > 10.0 * RESOLUTION_MM,
             "the clock left {least_mm} to {greatest_mm} mm"

@@ -175,7 +175,7 @@ impl Unknowns {
             AccelLimit => (1.0, 1e6),
             Coulomb => (0.0, 1e5),
             Viscous => (0.0, 100.0),
-            BedFrequency => (1.0, 200.0),
+            BedFrequency => (1.0, 160.0),
             BedDamping => (0.0, 0.9),
             BedMassRatio => (1e-6, 5.0),
         }

@@ -57,7 +57,7 @@ struct Run {
     starts: Vec<usize>,
     /// Variance of every group's mean \[mm²\].
     variances: Vec<f64>,
-    /// The offsets that moments leave, by group, each with its standard deviation of 1 for a drive's step of 1 s.
+    /// The offsets that moments leave, by group, each of a standard deviation of 1 \[mm\].
     moments: Vec<Vec<f64>>,
     travel_mm: f64,
     /// What the variances are to be multiplied by: the model may not follow.
@@ -246,7 +246,7 @@ impl Runs {
                 limited: &limited,
                 tick_s,
             };
-            // Slack is wider than what moments leave.
+            // Only the last stage has no slack, which is wider than what moments leave.
             let moments = if substeps == SUBSTEPS { motion.offsets() } else { Vec::new() };
             if resolution_mm > 0.0 {
                 self.group(index, &|tick| {
@@ -333,15 +333,13 @@ impl Runs {
         Weights(self.runs.iter().map(|run| self.whitening(run, precision)).collect())
     }
 
-    fn whitening(&self, run: &Run, Precision { substeps, slack }: Precision) -> Whitening {
-        let step_s = self.tick_s / f64::from(substeps);
+    fn whitening(&self, run: &Run, Precision { slack, .. }: Precision) -> Whitening {
         let slack_mm2 = (slack * run.travel_mm).powi(2);
         let roots: Vec<f64> =
             run.variances.iter().map(|variance| (variance * run.scale + slack_mm2).sqrt().recip()).collect();
         let mut offsets = vec![roots.clone()];
-        // Slack is wider than what moments leave.
         for moment in run.moments.iter().filter(|_| slack == 0.0) {
-            offsets.push(moment.iter().zip(&roots).map(|(value, root)| value * step_s * root).collect());
+            offsets.push(moment.iter().zip(&roots).map(|(value, root)| value * root).collect());
         }
         let mut normal = normal(&offsets);
         for index in 1..offsets.len() {

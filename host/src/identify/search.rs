@@ -8,7 +8,7 @@ use super::cholesky::Symmetric;
 use super::estimate::MET;
 use super::parameters::{Unknown, Unknowns};
 use super::readings::{Precision, Residuals, Runs, Sums};
-use super::simulation::{LANES, SUBSTEPS};
+use super::simulation::LANES;
 
 /// The end of a search.
 #[derive(Clone, Debug)]
@@ -17,19 +17,13 @@ pub(super) struct Found {
     pub(super) residuals: Residuals,
     /// The weighted squares of each run, of the weights as they were at the end.
     pub(super) misfits: Vec<f64>,
-    /// Ends of other searches that are hardly worse.
+    /// Ends of other searches that are hardly worse, as far as it is known.
     pub(super) rivals: Vec<Unknowns>,
 }
 
 impl Found {
     pub(super) fn misfit(&self) -> f64 {
         self.misfits.iter().sum()
-    }
-
-    /// The misfits again, for readings that were grouped anew since.
-    pub(super) fn misfits_of(&self, runs: &Runs) -> Option<Vec<f64>> {
-        let residuals = runs.residuals(&[self.unknowns], SUBSTEPS).pop()??;
-        Some(runs.weights(Precision::LAST).misfits(&residuals))
     }
 }
 

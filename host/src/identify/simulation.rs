@@ -230,8 +230,8 @@ impl Simulation {
         }
     }
 
-    /// Drives an axis that starts at rest at 0; `each` has the state at the start of every tick, and may change it. The ticks in
-    /// which the first set's current limit stops or frees the integrator.
+    /// Drives an axis that starts at rest at 0; `each` has the state at the start of every tick, and may change it. Returns the
+    /// ticks in which the first set's current limit stops or frees the integrator.
     pub(super) fn run(&self, command_mm_s: &[f64], each: &mut dyn FnMut(usize, &mut State)) -> Vec<usize> {
         let Self { model, whole_ticks, substeps, .. } = self;
         let mut state = State::default();

@@ -10,11 +10,12 @@ use super::parameters::{Unknown, Unknowns};
 use super::readings::{Precision, Runs};
 use super::search::{Effort, Found, LAST_EFFORT, derivatives, is_met, search};
 
+/// Over to a valley that answers alike, before it is judged.
 pub(super) const EXCHANGED_EFFORT: Effort =
     Effort { precision: Precision::LAST, jacobians: 4, least_gain: 10.0 };
-/// A valley that is this much worse after a few steps is left; one that is this much worse at its end is a rival,
-/// which chance prefers in one of a hundred cases.
+/// A valley that is this much worse after a few steps is left.
 pub(super) const NEAR: f64 = 3e4;
+/// An end that is less than this worse is a rival: chance prefers the wrong one in one of a hundred cases.
 const RIVAL: f64 = 9.0;
 /// Difference in misfit below which more search may still decide.
 pub(super) const UNDECIDED: f64 = 1e3;
@@ -22,8 +23,9 @@ pub(super) const UNDECIDED: f64 = 1e3;
 const LOST: f64 = 100.0;
 /// Most valleys that answer alike.
 const VALLEYS_MAX: usize = 6;
-/// A parabola tells the rise of misfit within its valley to this factor, and to what searches leave.
+/// A parabola tells the rise of misfit within its valley to this factor ...
 const PARABOLA: f64 = 4.0;
+/// ... and to what searches leave.
 const SAME: f64 = 1.0;
 
 pub(super) const SETTLING_EFFORT: Effort = Effort { jacobians: 5, ..LAST_EFFORT };
@@ -121,64 +123,134 @@ impl Valley {
         off.iter().enumerate().map(|(index, by)| by * row(index)).sum()
     }
 
-    /// Whether a place lies in the valley: no higher than it can be there.
+    /// Whether a place may lie in the valley: it is no lower there than the parabola tells. It is higher where a search is
+    /// still on its way down to the floor.
     fn holds(&self, place: &Found, free: &[Unknown]) -> bool {
         let higher = (place.misfit() - self.end.misfit()).max(0.0);
         self.rise(&place.unknowns, free) < PARABOLA * higher + SAME
     }
 }
 
-/// The least of what was found and of the valleys that answer alike; those that are hardly worse are its rivals.
+/// The valleys that are known.
+struct Valleys<'a> {
+    runs: &'a Runs,
+    free: &'a [Unknown],
+    all: Vec<Valley>,
+}
+
+impl Valleys<'_> {
+    /// Whether a search that has come to `place` is on its way back to a known end.
+    fn is_back(&self, place: &Found) -> bool {
+        let is_back =
+            |valley: &Valley| place.misfit() >= valley.end.misfit() && valley.holds(place, self.free);
+        self.all.iter().any(is_back)
+    }
+
+    /// An end: of a new valley, or a lower one of a known valley.
+    fn add(&mut self, end: Found) {
+        match self.all.iter_mut().find(|valley| valley.holds(&end, self.free)) {
+            Some(valley) if end.misfit() < valley.end.misfit() => valley.end = end,
+            Some(_) => {}
+            None => self.all.extend(Valley::of(self.runs, end, self.free)),
+        }
+    }
+
+    /// The lowest end, with those as rivals that are hardly worse.
+    fn lowest(mut self) -> Option<Found> {
+        self.all.sort_by(|a, b| a.end.misfit().total_cmp(&b.end.misfit()));
+        let mut ends = self.all.into_iter().map(|valley| valley.end);
+        let mut best = ends.next()?;
+        let is_rival = |other: &Found| other.misfit() < best.misfit() + RIVAL;
+        best.rivals = ends.filter(is_rival).map(|other| other.unknowns).collect();
+        Some(best)
+    }
+}
+
+/// The least of what was found and of the valleys that answer alike; those that are hardly worse are its rivals, beside those
+/// that it has.
 fn with_rivals(runs: &Runs, found: Found, free: &[Unknown]) -> Option<Found> {
     let lag_limit_s = runs.lag_limit_s();
-    let first = found.misfit();
-    let mut valleys = vec![Valley::of(runs, found, free)?];
+    let (first, rivals) = (found.misfit(), found.rivals.clone());
+    let mut valleys = Valleys { runs, free, all: vec![Valley::of(runs, found, free)?] };
     let mut next = 0;
-    while next < valleys.len() && valleys.len() < VALLEYS_MAX {
-        let near = &valleys[next].end;
+    while next < valleys.all.len() && valleys.all.len() < VALLEYS_MAX {
+        let near = &valleys.all[next].end;
         next += 1;
         // What answers alike may be reached only from what answers alike, but not from far off.
         if near.misfit() > first + UNDECIDED {
             continue;
         }
         for start in near.unknowns.exchanged() {
-            let is_known = |place: &Found| {
-                let is_back =
-                    |valley: &Valley| place.misfit() >= valley.end.misfit() && valley.holds(place, free);
-                valleys.iter().any(is_back)
-            };
             let begun = search(runs, start.bounded(free, lag_limit_s), free, EXCHANGED_EFFORT);
-            let begun = begun.filter(|begun| begun.misfit() < first + NEAR && !is_known(begun));
-            let Some(end) = begun.and_then(|begun| search(runs, begun.unknowns, free, LAST_EFFORT)) else {
-                continue;
-            };
-            match valleys.iter_mut().find(|valley| valley.holds(&end, free)) {
-                Some(valley) if end.misfit() < valley.end.misfit() => valley.end = end,
-                Some(_) => {}
-                None => valleys.extend(Valley::of(runs, end, free)),
+            let begun = begun.filter(|begun| begun.misfit() < first + NEAR && !valleys.is_back(begun));
+            if let Some(end) = begun.and_then(|begun| search(runs, begun.unknowns, free, LAST_EFFORT)) {
+                valleys.add(end);
             }
         }
     }
-    ranked(valleys)
-}
-
-/// The lowest of valleys, with those as rivals that are hardly worse.
-fn ranked(mut valleys: Vec<Valley>) -> Option<Found> {
-    valleys.sort_by(|a, b| a.end.misfit().total_cmp(&b.end.misfit()));
-    let mut ends = valleys.into_iter().map(|valley| valley.end);
-    let mut best = ends.next()?;
-    let is_rival = |other: &Found| other.misfit() < best.misfit() + RIVAL;
-    best.rivals = ends.filter(is_rival).map(|other| other.unknowns).collect();
+    let mut best = valleys.lowest()?;
+    best.rivals.extend(rivals);
     Some(best)
 }
 
 /// What was found and its rivals, searched once more: of readings that were grouped anew.
 pub(super) fn settled(runs: &Runs, found: &Found, free: &[Unknown]) -> Option<Found> {
-    let mut valleys = vec![Valley::of(runs, search(runs, found.unknowns, free, SETTLING_EFFORT)?, free)?];
-    for rival in &found.rivals {
-        let end = search(runs, *rival, free, SETTLING_EFFORT);
-        let end = end.filter(|end| !valleys.iter().any(|valley| valley.holds(end, free)));
-        valleys.extend(end.and_then(|end| Valley::of(runs, end, free)));
+    let end = search(runs, found.unknowns, free, SETTLING_EFFORT)?;
+    if found.rivals.is_empty() {
+        return Some(end);
     }
-    ranked(valleys)
+    let mut valleys = Valleys { runs, free, all: vec![Valley::of(runs, end, free)?] };
+    for rival in &found.rivals {
+        if let Some(end) = search(runs, *rival, free, SETTLING_EFFORT) {
+            valleys.add(end);
+        }
+    }
+    valleys.lowest()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixtures::sticking;
+    use super::*;
+
+    const FREE: [Unknown; 2] = [Unknown::Offset, Unknown::Viscous];
+
+    fn found(offset: f64, viscous: f64, misfit: f64) -> Found {
+        let unknowns = sticking().shifted(Unknown::Offset, offset).shifted(Unknown::Viscous, viscous);
+        Found { unknowns, residuals: Vec::new(), misfits: vec![misfit], rivals: Vec::new() }
+    }
+
+    /// Of a floor that rises by 9·a² + 4·b².
+    fn valley(end: Found) -> Valley {
+        let mut information = Symmetric::zero(2);
+        *information.at_mut(0, 0) = 9.0;
+        *information.at_mut(1, 1) = 4.0;
+        Valley { end, information }
+    }
+
+    #[test]
+    fn a_valley_holds_what_its_parabola_tells() {
+        let valley = valley(found(0.0, 0.0, 100.0));
+        // 9·4 + 4·9 = 72 higher.
+        assert!((valley.rise(&found(2.0, 3.0, 0.0).unknowns, &FREE) - 72.0).abs() < 1e-9);
+        for (misfit, is_held) in [(172.0, true), (130.0, true), (400.0, true), (117.0, false), (105.0, false)]
+        {
+            assert_eq!(valley.holds(&found(2.0, 3.0, misfit), &FREE), is_held, "{misfit}");
+        }
+        assert!(valley.holds(&found(0.1, 0.1, 99.0), &FREE), "a lower end of the same valley");
+    }
+
+    #[test]
+    fn ends_of_other_places_are_rivals_if_they_are_hardly_worse() {
+        let runs = Runs::new(&[], 1e-3);
+        let ends = [(0.0, 0.0, 100.0), (9.0, 0.0, 104.0), (0.0, 9.0, 98.0), (-9.0, 0.0, 120.0)];
+        let all = ends.map(|(offset, viscous, misfit)| valley(found(offset, viscous, misfit)));
+        let mut valleys = Valleys { runs: &runs, free: &FREE, all: all.into() };
+        // Lower, and on its way back, in valleys that are known.
+        valleys.add(found(9.05, 0.0, 103.0));
+        assert!(valleys.is_back(&found(0.0, 10.0, 102.0)) && !valleys.is_back(&found(0.0, 9.05, 97.0)));
+        let lowest = valleys.lowest().expect("an end");
+        assert_eq!(lowest.misfit(), 98.0);
+        assert_eq!(lowest.rivals, [found(0.0, 0.0, 0.0).unknowns, found(9.05, 0.0, 0.0).unknowns]);
+    }
 }
