@@ -1,9 +1,9 @@
 //! Identification: the parameters of a servo axis, from recordings of outputs and encoder readings.
 //!
 //! Consumes [`AxisRecording`]s of the motions that [`explore`] asks for, or of any others that start at rest, from an
-//! open or a closed loop; produces an [`Identification`]. Runs in the background of the PC, in one to seven seconds
-//! of processor time for ten seconds of recordings. It never sees the parameters of a simulation: a machine
-//! gives the same two columns.
+//! open or a closed loop; produces an [`Identification`]. Runs in the background of the PC, mostly in two seconds of processor
+//! time for ten seconds of recordings, in twelve at most. It never sees the parameters of a simulation: a machine gives the
+//! same two columns.
 //!
 //! Two methods:
 //!

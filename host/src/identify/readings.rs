@@ -311,8 +311,8 @@ impl Runs {
                 if tick >= run.starts[group + 1] {
                     group += 1;
                 }
-                for lane in 0..LANES {
-                    sums[group][lane] += state.position[lane];
+                for (sum, position) in sums[group].iter_mut().zip(state.position) {
+                    *sum += position;
                 }
             });
             for (lane, residuals) in all.iter_mut().enumerate() {
