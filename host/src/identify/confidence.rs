@@ -324,8 +324,8 @@ mod tests {
         assert_eq!(scatter_of_sums(&[Vec::new(), vec![0.0; 5]]), 1.0);
     }
 
-    /// A quiet axis that does not move by whole counts from tick to tick: intervals are those of readings whose errors make each other
-    /// good, but not where the model does not follow.
+    /// A quiet axis that does not move by whole counts from tick to tick: intervals are those of readings whose errors
+    /// make each other good, but not where the model does not follow.
     #[test]
     fn intervals_of_a_quiet_axis_are_narrower() {
         const RESOLUTION_MM: f64 = 1e-3;

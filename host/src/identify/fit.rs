@@ -68,8 +68,9 @@ const FOLLOWED_WELL: f64 = 1.05;
 const OTHER_BEDS_HZ: [f64; 9] = [5.5, 8.0, 12.0, 17.0, 25.0, 36.0, 52.0, 75.0, 108.0];
 const OTHER_BED: (f64, f64) = (0.03, 0.05);
 const OTHER_JACOBIANS: usize = 3;
-/// Those that are followed, and the logarithm of two frequencies' ratio below which they are one.
+/// Those that are followed ...
 const OTHERS: usize = 2;
+/// ... of distinct frequencies: two are one if the logarithm of their ratio is below this.
 const SAME_FREQUENCY: f64 = 0.2;
 
 /// A bed must lower the misfit by what its three unknowns are worth by themselves, three logarithms of the number of

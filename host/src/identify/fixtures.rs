@@ -9,10 +9,22 @@ use super::simulation::SUBSTEPS;
 /// Of all recordings.
 pub(super) const TICK_S: f64 = 5e-4;
 
+/// The unknowns of a drive on a bed, with dead time, filter and current lag \[s\].
+pub(super) fn unknowns(
+    values: [(Unknown, f64); 9],
+    [dead_time_s, filter_s, current_s]: [f64; 3],
+) -> Unknowns {
+    let mut unknowns = Unknowns::zero(TICK_S / f64::from(SUBSTEPS));
+    for (unknown, value) in values {
+        unknowns.set(unknown, value);
+    }
+    unknowns.set_lags(dead_time_s, filter_s, current_s);
+    unknowns
+}
+
 /// A drive whose axis sticks, on a bed: nearly that of seed 476 of docs/DRIVES.md.
 pub(super) fn sticking() -> Unknowns {
-    let mut unknowns = Unknowns::zero(TICK_S / f64::from(SUBSTEPS));
-    for (unknown, value) in [
+    let values = [
         (Unknown::Gain, 1.0),
         (Unknown::VelocityGain, 193.8),
         (Unknown::IntegralTime, 0.019_73),
@@ -22,11 +34,8 @@ pub(super) fn sticking() -> Unknowns {
         (Unknown::BedFrequency, 6.07),
         (Unknown::BedDamping, 0.0063),
         (Unknown::BedMassRatio, 0.133),
-    ] {
-        unknowns.set(unknown, value);
-    }
-    unknowns.set_lags(4.843e-5, 1.082e-4, 1.229e-4);
-    unknowns
+    ];
+    unknowns(values, [4.843e-5, 1.082e-4, 1.229e-4])
 }
 
 /// What an encoder of `resolution_mm` reads of the simulated drive.

@@ -259,12 +259,12 @@ impl Simulation {
 mod tests {
     use hal_sim::{DriveModel, DriveState, REFERENCE_Y};
 
+    use super::super::fixtures::unknowns;
     use super::*;
 
     fn reference_y() -> Unknowns {
-        let mut unknowns = Unknowns::zero(2.5e-5);
         let bed = REFERENCE_Y.bed.expect("Y has a bed");
-        for (unknown, value) in [
+        let values = [
             (Unknown::Gain, 1.0),
             (Unknown::VelocityGain, 440.0),
             (Unknown::IntegralTime, 0.0275),
@@ -274,11 +274,8 @@ mod tests {
             (Unknown::BedFrequency, bed.frequency_hz),
             (Unknown::BedDamping, bed.damping_ratio),
             (Unknown::BedMassRatio, bed.mass_ratio),
-        ] {
-            unknowns.set(unknown, value);
-        }
-        unknowns.set_lags(0.001_43, 0.0007, 0.000_37);
-        unknowns
+        ];
+        unknowns(values, [0.001_43, 0.0007, 0.000_37])
     }
 
     /// Without the current limit bit for bit but for the order of operations, with it to half a sub-step.

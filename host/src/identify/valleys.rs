@@ -21,13 +21,14 @@ const RIVAL: f64 = 9.0;
 pub(super) const UNDECIDED: f64 = 1e3;
 /// Misfit for each reading beyond which a model has no valley worth looking beside.
 const LOST: f64 = 100.0;
-/// Most valleys that answer alike.
+/// Valleys that answer alike, with which no further ones are looked for.
 const VALLEYS_MAX: usize = 6;
 /// A parabola tells the rise of misfit within its valley to this factor ...
 const PARABOLA: f64 = 4.0;
 /// ... and to what searches leave.
 const SAME: f64 = 1.0;
 
+/// Once more, of readings that were grouped or weighed anew.
 pub(super) const SETTLING_EFFORT: Effort = Effort { jacobians: 5, ..LAST_EFFORT };
 
 /// Kicks along the floor, in standard deviations, and the gain in misfit for which what follows is searched.
