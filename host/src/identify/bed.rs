@@ -30,7 +30,7 @@ fn likely(runs: &Runs, found: &Found, precision: Precision) -> Option<Vec<(Unkno
         .map(|index| {
             let share = index as f64 / (TRIED - 1) as f64;
             let mut tried = found.unknowns;
-            tried.set(Unknown::BedFrequency, LEAST_HZ * (MOST_HZ / LEAST_HZ).powf(share));
+            tried.set(Unknown::BedFrequency, LEAST_HZ * libm::pow(MOST_HZ / LEAST_HZ, share));
             tried.set(Unknown::BedDamping, TRIED_DAMPING);
             tried.set(Unknown::BedMassRatio, TRIED_MASS_RATIO);
             tried

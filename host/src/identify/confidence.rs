@@ -127,7 +127,7 @@ pub(super) fn confidence(runs: &mut Runs, found: &Found, free: &[Unknown], left:
             sample.bounded(free, lag_limit_s)
         };
         // By the likelihood of the valley.
-        let share = (-0.5 * (misfit - least_misfit).max(0.0)).exp();
+        let share = libm::exp(-0.5 * (misfit - least_misfit).max(0.0));
         samples.extend((0..(share * SAMPLES as f64) as usize).map(sample));
     }
     Some(Confidence { best: found.unknowns, samples, widening: 1.0 + left.max(0.0).sqrt() / 1.96 })

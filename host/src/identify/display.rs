@@ -133,7 +133,7 @@ fn offset(estimate: Estimate) -> Described {
 fn decimals(half_width: f64) -> usize {
     if half_width > 0.0 && half_width.is_finite() {
         // The cast saturates.
-        (1.0 - half_width.log10().floor()).clamp(0.0, 6.0) as usize
+        (1.0 - libm::log10(half_width).floor()).clamp(0.0, 6.0) as usize
     } else {
         3
     }

@@ -163,8 +163,8 @@ impl Excitation {
                 let at = |tick: usize| {
                     let phase = tick as f64 * tick_s * frequency_hz;
                     let edge = phase.min(periods - phase).clamp(0.0, 1.0);
-                    let envelope = 0.5 - 0.5 * (PI * edge).cos();
-                    amplitude_mm_s * envelope * (2.0 * PI * phase).sin()
+                    let envelope = 0.5 - 0.5 * libm::cos(PI * edge);
+                    amplitude_mm_s * envelope * libm::sin(2.0 * PI * phase)
                 };
                 (0..ticks(periods / frequency_hz)).map(at).collect()
             }

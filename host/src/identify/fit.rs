@@ -177,7 +177,7 @@ impl Stages {
     /// Whether the misfits tell a bed from chance.
     fn is_bed(&self, rigid: &Found, bed: &Found) -> bool {
         let is_heavy = bed.unknowns.get(Unknown::BedMassRatio) > LEAST_RATIO;
-        is_heavy && self.gain(rigid, bed) > 3.0 * self.readings().ln() + BED_GAIN
+        is_heavy && self.gain(rigid, bed) > 3.0 * libm::log(self.readings()) + BED_GAIN
     }
 
     /// Where the rigid model follows in the middle: a bed, if its remainder promises one.
@@ -259,7 +259,7 @@ impl Stages {
         let mut distinct: Vec<&Found> = Vec::new();
         for found in &found {
             let is_same =
-                |other: &&Found| (frequency_hz(other) / frequency_hz(found)).ln().abs() < SAME_FREQUENCY;
+                |other: &&Found| libm::log(frequency_hz(other) / frequency_hz(found)).abs() < SAME_FREQUENCY;
             if !distinct.iter().any(is_same) {
                 distinct.push(found);
             }
@@ -333,7 +333,7 @@ fn without_filter(runs: &Runs, found: &Found, free: &[Unknown]) -> Option<Found>
     start.set(Unknown::FilterSpread, 0.0);
     let simpler = search(runs, start, &others, SETTLING_EFFORT)?;
     let readings = runs.readings();
-    let is_enough = simpler.misfit() < found.misfit() + readings.ln() + STAIRS;
+    let is_enough = simpler.misfit() < found.misfit() + libm::log(readings) + STAIRS;
     let rivals = || found.rivals.iter().copied().chain([found.unknowns]).collect();
     is_enough.then(|| Found { rivals: rivals(), ..simpler })
 }

@@ -106,7 +106,7 @@ impl Unknown {
     /// From one set to another, in the search's coordinate.
     pub(super) fn distance(self, from: &Unknowns, to: &Unknowns) -> f64 {
         let (from, to) = (from.get(self), to.get(self));
-        if self.is_logarithmic() { (to / from).ln() } else { to - from }
+        if self.is_logarithmic() { libm::log(to / from) } else { to - from }
     }
 
     /// The greatest step of one iteration, in the search's coordinate.
@@ -211,7 +211,7 @@ impl Unknowns {
     pub(super) fn shifted(&self, unknown: Unknown, step: f64) -> Self {
         let mut next = *self;
         let value = self.get(unknown);
-        next.set(unknown, if unknown.is_logarithmic() { value * step.exp() } else { value + step });
+        next.set(unknown, if unknown.is_logarithmic() { value * libm::exp(step) } else { value + step });
         next
     }
 
@@ -290,7 +290,7 @@ impl Unknowns {
     #[cfg(test)]
     pub(super) fn set_lags(&mut self, dead_time_s: f64, filter_s: f64, current_s: f64) {
         let delay_s =
-            |lag_s: f64| if lag_s > 0.0 { self.step_s / (self.step_s / lag_s).exp_m1() } else { 0.0 };
+            |lag_s: f64| if lag_s > 0.0 { self.step_s / libm::expm1(self.step_s / lag_s) } else { 0.0 };
         let (filter_s, current_s) = (delay_s(filter_s), delay_s(current_s));
         self.set(Lag, dead_time_s + filter_s + current_s);
         self.set(CurrentLag, current_s);
@@ -299,7 +299,7 @@ impl Unknowns {
 
     /// The time constant of a lag, in sub-steps, of this mean delay \[s\].
     fn time_constant_s(&self, delay_s: f64) -> f64 {
-        if delay_s > 0.0 { self.step_s / (self.step_s / delay_s).ln_1p() } else { 0.0 }
+        if delay_s > 0.0 { self.step_s / libm::log1p(self.step_s / delay_s) } else { 0.0 }
     }
 
     /// Tf \[s\].

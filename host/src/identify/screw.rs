@@ -438,7 +438,7 @@ impl Fit {
         // And the scatter.
         let unknowns = self.unknowns.len() as f64 + 1.0;
         let places = self.places_read as f64;
-        places * mean_mm2.ln() + unknowns * places.ln()
+        places * libm::log(mean_mm2) + unknowns * libm::log(places)
     }
 
     /// Half of the 95 % interval of a sum of unknowns, by the inverse of the normal equations.

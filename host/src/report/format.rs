@@ -32,7 +32,7 @@ pub(super) fn figure(value: f64, digits: i32) -> String {
     if value.abs() < f64::MIN_POSITIVE {
         return "0".to_string();
     }
-    let magnitude = value.abs().log10().floor() as i32;
+    let magnitude = libm::log10(value.abs()).floor() as i32;
     if !(-4..9).contains(&magnitude) {
         let mantissa = trimmed(value / 10f64.powi(magnitude), digits - 1);
         return format!("{mantissa}·10{}", superscript(magnitude));
@@ -54,7 +54,7 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
 
 /// `value` to the resolution a scale that spans `span` can show. Used for the numbers along an axis.
 pub(super) fn scale_mark(value: f64, span: f64) -> String {
-    let decimals = if span > 0.0 { 3 - span.log10().floor() as i32 } else { 0 };
+    let decimals = if span > 0.0 { 3 - libm::log10(span).floor() as i32 } else { 0 };
     trimmed(value, decimals)
 }
 

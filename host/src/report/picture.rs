@@ -96,7 +96,7 @@ fn draw(stack: &Stack, graph: &Graph, top: f64, svg: &mut String) {
 /// Multiples of 1, 2 or 5 times a power of ten that divide an axis into about `parts`.
 fn marks(from: f64, to: f64, parts: f64) -> Vec<f64> {
     let least = (to - from) / parts;
-    let decade = 10f64.powf(least.log10().floor());
+    let decade = libm::exp10(libm::log10(least).floor());
     let step = [1.0, 2.0, 5.0, 10.0].map(|part| part * decade).into_iter().find(|step| *step >= least);
     let step = step.unwrap_or(10.0 * decade);
     let (first, last) = ((from / step - 1e-9).ceil() as i64, (to / step + 1e-9).floor() as i64);

@@ -36,7 +36,7 @@ fn grid_bits<const N: usize>(wanted: &[[f64; 7]; N]) -> Option<i32> {
     let thirds = wanted.iter().flat_map(|axis| [axis[2], at_end(axis)[3]]);
     let third = thirds.fold(0.0, |most, third| f64::max(most, 6.0 * third.abs()));
     let [least, most] = GRID_BITS;
-    let more = (BENT / third).log2().max(0.0);
+    let more = libm::log2(BENT / third).max(0.0);
     (more <= f64::from(most - least)).then(|| least + 2 * (0.5 * more).ceil() as i32)
 }
 
@@ -49,7 +49,7 @@ pub(super) fn short<const N: usize>(
     is_followed: bool,
 ) -> ([Position; N], [[f64; 7]; N]) {
     let Some(bits) = grid_bits(&wanted) else { return (start, wanted) };
-    let near_part = f64::exp2(f64::from(GRID_BITS[0] - bits));
+    let near_part = libm::exp2(f64::from(GRID_BITS[0] - bits));
     let first_bits = if is_followed { (bits + TURNED_GRID_BITS).min(GRID_BITS[1]) } else { bits };
     let Some((end, before, length_before)) = before.and_then(|before| piece(&before.item)) else {
         return (start, rounded(&wanted, first_bits));
@@ -116,7 +116,7 @@ fn at_end(coefficients: &[f64; 7]) -> [f64; 4] {
 }
 
 fn on_grid(coefficient: f64, bits: i32) -> f64 {
-    let steps = f64::exp2(f64::from(bits));
+    let steps = libm::exp2(f64::from(bits));
     // Without the sign of a zero.
     (coefficient * steps).round() / steps + 0.0
 }

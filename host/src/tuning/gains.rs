@@ -127,7 +127,7 @@ fn digits(value: f64, decimals: i32, round: fn(f64) -> f64) -> f64 {
     if !(value > 0.0) {
         return 0.0;
     }
-    let unit = 10_f64.powi(decimals - value.log10().floor() as i32);
+    let unit = 10_f64.powi(decimals - libm::log10(value).floor() as i32);
     round(value * unit) / unit
 }
 

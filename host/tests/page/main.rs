@@ -3,6 +3,8 @@
 //! Needs `chromium` and `chromedriver`, the playground also what `host/wasm/build` needs, and one test node; without them a test is
 //! listed and ignored with the reason, but fails where `CI=true`. Work is counted, and no clock is read.
 
+#![allow(clippy::disallowed_methods, reason = "what a platform computes is an oracle here")]
+
 mod browser;
 mod findings;
 mod made_up;

@@ -122,7 +122,7 @@ fn in_equal_ratios(arguments: &BodeArguments) -> Result<Vec<f64>, CliError> {
     }
     let last = points - 1;
     let at = |index: u32| {
-        if index == last { to } else { from * (to / from).powf(f64::from(index) / f64::from(last)) }
+        if index == last { to } else { from * libm::pow(to / from, f64::from(index) / f64::from(last)) }
     };
     Ok((0..points).map(at).collect())
 }
@@ -155,7 +155,7 @@ fn write_points(bode: &Bode, out: &mut dyn Write) -> io::Result<()> {
         ("harmonic", "°", Align::Right),
         ("linear", "°", Align::Right),
     ];
-    let db = |ratio: f64| format!("{:.2}", 20.0 * ratio.log10());
+    let db = |ratio: f64| format!("{:.2}", 20.0 * libm::log10(ratio));
     let rows: Vec<[String; 8]> = points(bode)
         .iter()
         .map(|point| {

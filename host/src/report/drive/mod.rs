@@ -35,7 +35,7 @@ use crate::machine::Machine;
 const HALF_POWER_DB: f64 = -3.0103;
 
 fn db(ratio: f64) -> f64 {
-    20.0 * ratio.log10()
+    20.0 * libm::log10(ratio)
 }
 
 /// Amplitude and phase over frequency.

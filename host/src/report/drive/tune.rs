@@ -180,7 +180,7 @@ fn gain_margin(gain: f64) -> String {
 /// Frequencies in equal ratios.
 fn curve_hz() -> impl Iterator<Item = f64> {
     let ratio = CURVE_HZ.1 / CURVE_HZ.0;
-    (0..CURVE_POINTS).map(move |i| CURVE_HZ.0 * ratio.powf(f64::from(i) / f64::from(CURVE_POINTS - 1)))
+    (0..CURVE_POINTS).map(move |i| CURVE_HZ.0 * libm::pow(ratio, f64::from(i) / f64::from(CURVE_POINTS - 1)))
 }
 
 /// A response over frequency: amplitudes \[dB\] and phases \[°\].

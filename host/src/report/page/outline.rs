@@ -26,7 +26,7 @@ pub(super) struct Vertex {
 
 /// The tolerance of a level, in the unit of the finest one.
 pub(super) fn tolerance(finest: f64, level: u8) -> f64 {
-    finest * f64::from(level).exp2()
+    finest * libm::exp2(f64::from(level))
 }
 
 /// The vertices of a path through `points`, down to the tolerance `finest`.
@@ -74,7 +74,7 @@ fn between<const D: usize>(
         let distance = most.sqrt();
         if distance > finest {
             // No finer than the stretch it divides, so that pictures share vertices.
-            let level = (distance / finest).log2().ceil().min(f64::from(RANK_MAX)) as u8;
+            let level = libm::log2(distance / finest).ceil().min(f64::from(RANK_MAX)) as u8;
             let rank = level.clamp(1, above);
             left.push(Left::Stretch(farthest, to, rank));
             left.push(Left::Vertex(Vertex { point: farthest, rank }));
@@ -129,7 +129,7 @@ mod tests {
                 let place: [f64; 3] = match kind {
                     0 | 1 => std::array::from_fn(|axis| here[axis] + part * to[axis]),
                     2 => {
-                        let (sine, cosine) = (turn * part).sin_cos();
+                        let (sine, cosine) = libm::sincos(turn * part);
                         [here[0] + radius * sine, here[1] + radius * (1.0 - cosine), here[2] + part * to[2]]
                     }
                     // Down and up again.
