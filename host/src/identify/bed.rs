@@ -25,7 +25,8 @@ pub(super) fn likely_beds(runs: &Runs, found: &Found, precision: Precision) -> V
 }
 
 fn likely(runs: &Runs, found: &Found, precision: Precision) -> Option<Vec<(Unknowns, f64)>> {
-    let (mut columns, still) = derivatives(runs, &found.unknowns, without_bed(), precision)?;
+    let (mut columns, still) =
+        derivatives(runs, &found.unknowns, without_bed(), precision.substeps, precision.slack == 0.0)?;
     let tried: Vec<Unknowns> = (0..TRIED)
         .map(|index| {
             let share = index as f64 / (TRIED - 1) as f64;

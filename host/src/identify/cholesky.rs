@@ -105,6 +105,11 @@ impl Lower {
         }
     }
 
+    /// ln det L.
+    pub(super) fn log_determinant(&self) -> f64 {
+        (0..self.order).map(|row| libm::log(self.cells[row * (self.order + 1)])).sum()
+    }
+
     /// `right` becomes L·right.
     pub(super) fn times(&self, right: &[f64]) -> Vec<f64> {
         let n = self.order;

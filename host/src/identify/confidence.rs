@@ -18,9 +18,10 @@
 
 use super::Estimate;
 use super::cholesky::{Lower, Symmetric};
-use super::parameters::{Unknown, Unknowns};
+use super::parameters::{ALL, Unknown, Unknowns, without_bed};
 use super::readings::{Precision, Residuals, Runs, Weights, dot};
 use super::search::{Found, derivatives};
+use super::simulation::SUBSTEPS;
 use crate::chance::Chance;
 
 /// Lags over which autocorrelation is summed at most.
@@ -84,9 +85,65 @@ pub(super) struct Confidence {
     widening: f64,
 }
 
+/// Where the recordings may be from: the end of a search, and how wide its valley is.
+struct Place<'a> {
+    centre: Unknowns,
+    free: &'a [Unknown],
+    misfit: f64,
+    information: Symmetric,
+    /// Of the covariance.
+    factor: Lower,
+    log_volume: f64,
+}
+
+impl<'a> Place<'a> {
+    fn of(runs: &Runs, weights: &Weights, centre: Unknowns, free: &'a [Unknown]) -> Option<Self> {
+        let (mut columns, residuals) = derivatives(runs, &centre, free, SUBSTEPS, true)?;
+        let misfit = weights.misfits(&residuals).iter().sum();
+        widen(runs, weights, &centre, free, &mut columns, &residuals);
+        let mut information = weights.sums(&columns, &residuals).normal;
+        for (index, unknown) in free.iter().enumerate() {
+            // An unknown that no run shows ends with this width, far beyond what counts as determined.
+            *information.at_mut(index, index) += unknown.ignorance().powi(-2);
+        }
+        let factor = inverse_factor(&information)?;
+        let log_volume = factor.log_determinant();
+        Some(Self { centre, free, misfit, information, factor, log_volume })
+    }
+
+    /// Whether another end is the same place: within a standard deviation.
+    fn holds(&self, other: &Unknowns, free: &[Unknown]) -> bool {
+        free.len() == self.free.len() && distance2(&self.information, free, &self.centre, other) < 1.0
+    }
+
+    fn sample(&self, chance: &mut Chance, lag_limit_s: f64) -> Unknowns {
+        let normal: Vec<f64> = self.free.iter().map(|_| chance.normal()).collect();
+        let steps = self.factor.times(&normal);
+        let moved = self.free.iter().zip(steps);
+        let moved = moved.fold(self.centre, |sample, (&unknown, step)| sample.shifted(unknown, step));
+        moved.bounded(self.free, lag_limit_s)
+    }
+}
+
+/// dᵀ·information·d for the way d between two places, in the coordinates of the `free` unknowns: by how much misfit rises
+/// along it, if its floor is a parabola.
+pub(super) fn distance2(information: &Symmetric, free: &[Unknown], from: &Unknowns, to: &Unknowns) -> f64 {
+    let off: Vec<f64> = free.iter().map(|unknown| unknown.distance(from, to)).collect();
+    let row = |row: usize| -> f64 {
+        off.iter().enumerate().map(|(column, by)| information.at(row, column) * by).sum()
+    };
+    off.iter().enumerate().map(|(index, by)| by * row(index)).sum()
+}
+
 /// The confidence of what a search over the `free` unknowns found, with weights that are up to date; `None` if it
-/// can't be linearised.
-pub(super) fn confidence(runs: &mut Runs, found: &Found, free: &[Unknown], left: f64) -> Option<Confidence> {
+/// can't be linearised. Beside a rigid model, an `unproven` bed counts by what the recordings say for it.
+pub(super) fn confidence(
+    runs: &mut Runs,
+    found: &Found,
+    free: &[Unknown],
+    unproven: Option<&Found>,
+    left: f64,
+) -> Option<Confidence> {
     let whitened = runs.weights(Precision::LAST).whitened(&found.residuals);
     let factors: Vec<f64> = whitened.iter().map(|run| correlation_factor(run)).collect();
     // A remainder that counts as a whole counts once.
@@ -98,37 +155,35 @@ pub(super) fn confidence(runs: &mut Runs, found: &Found, free: &[Unknown], left:
     runs.scale_variances(&counted);
     let weights = runs.weights(Precision::LAST);
     let lag_limit_s = runs.lag_limit_s();
-    let mut chance = Chance(0x1DE7);
-    let mut samples = Vec::new();
-    let mut least_misfit = f64::INFINITY;
-    for centre in [found.unknowns].iter().chain(&found.rivals) {
-        let at_centre = derivatives(runs, centre, free, Precision::LAST);
-        // A rival that can't be linearised is none.
-        if at_centre.is_none() && *centre != found.unknowns {
+    let bed_price = (ALL.len() - without_bed().len()) as f64 * libm::log(runs.readings());
+    let alike = [found.unknowns].into_iter().chain(found.rivals.iter().copied());
+    let alike = alike.map(|centre| (centre, free, 0.0));
+    let centres = alike.chain(unproven.map(|bed| (bed.unknowns, &ALL[..], bed_price)));
+    let mut places: Vec<Place> = Vec::new();
+    for (centre, free, price) in centres {
+        if places.iter().any(|place| place.holds(&centre, free)) {
             continue;
         }
-        let (mut columns, residuals) = at_centre?;
-        let misfit: f64 = weights.misfits(&residuals).iter().sum();
-        least_misfit = least_misfit.min(misfit);
-        widen(runs, &weights, centre, free, &mut columns, &residuals);
-        let mut information = weights.sums(&columns, &residuals).normal;
-        for (index, unknown) in free.iter().enumerate() {
-            // An unknown that no run shows ends with this width, far beyond what counts as determined.
-            *information.at_mut(index, index) += unknown.ignorance().powi(-2);
+        match Place::of(runs, &weights, centre, free) {
+            Some(place) => places.push(Place { misfit: place.misfit + price, ..place }),
+            // A rival that can't be linearised is none.
+            None if centre != found.unknowns => {}
+            None => return None,
         }
-        let factor = inverse_factor(&information)?;
-        let sample = |_| {
-            let normal: Vec<f64> = free.iter().map(|_| chance.normal()).collect();
-            let steps = factor.times(&normal);
-            let mut sample = *centre;
-            for (&unknown, step) in free.iter().zip(steps) {
-                sample = sample.shifted(unknown, step);
-            }
-            sample.bounded(free, lag_limit_s)
-        };
-        // By the likelihood of the valley.
-        let share = libm::exp(-0.5 * (misfit - least_misfit).max(0.0));
-        samples.extend((0..(share * SAMPLES as f64) as usize).map(sample));
+    }
+    // Of valleys with as many unknowns a wide one counts for more. The price of a bed stands for what its unknowns may be.
+    let best = places.first()?;
+    let log_likelihood = |place: &Place| {
+        let log_volume = if place.free.len() == best.free.len() { place.log_volume } else { best.log_volume };
+        log_volume - 0.5 * place.misfit
+    };
+    let mut chance = Chance(0x1DE7);
+    let mut samples = Vec::new();
+    for place in &places {
+        // What was found was chosen by more than its misfit: a filter has to be worth its unknown.
+        let share = libm::exp((log_likelihood(place) - log_likelihood(best)).min(0.0));
+        let count = (share * SAMPLES as f64) as usize;
+        samples.extend((0..count).map(|_| place.sample(&mut chance, lag_limit_s)));
     }
     Some(Confidence { best: found.unknowns, samples, widening: 1.0 + left.max(0.0).sqrt() / 1.96 })
 }
@@ -339,7 +394,7 @@ mod tests {
         let found = Found { unknowns, residuals, misfits, rivals: Vec::new() };
         let free = [Unknown::Gain, Unknown::Offset, Unknown::Lag];
         let half_width = |left: f64| {
-            let confidence = confidence(&mut runs.clone(), &found, &free, left).expect("a confidence");
+            let confidence = confidence(&mut runs.clone(), &found, &free, None, left).expect("a confidence");
             confidence.estimate(|unknowns| unknowns.get(Unknown::Gain)).half_width_95
         };
         let part = half_width(0.0) / half_width(f64::MIN_POSITIVE);

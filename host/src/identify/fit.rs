@@ -11,7 +11,7 @@ use super::differences::Parabolas;
 use super::parameters::{ALL, Unknown, Unknowns, without_bed};
 use super::readings::{Precision, Runs, dot};
 use super::recording::{AxisRecording, span};
-use super::search::{Effort, Found, LAST_EFFORT, is_met, least, search};
+use super::search::{Differences, Effort, Found, LAST_EFFORT, is_met, least, search};
 use super::simulation::SUBSTEPS;
 use super::valleys::{EXCHANGED_EFFORT, NEAR, SETTLING_EFFORT, UNDECIDED, finished, settled};
 use super::{AxisParametersFound, BedEstimate, Estimate, IdentifyError, RunMatch};
@@ -45,16 +45,32 @@ const COARSE: [Unknown; 7] = [
 ];
 
 const GRID: Precision = Precision { substeps: 3, slack: 1e-2 };
-const COARSE_EFFORT: Effort =
-    Effort { precision: Precision { substeps: 4, slack: 5e-3 }, jacobians: 8, least_gain: 1.0 };
-const ROUGH_EFFORT: Effort =
-    Effort { precision: Precision { substeps: 5, slack: 2e-3 }, jacobians: 12, least_gain: 1.0 };
-const MIDDLE_EFFORT: Effort =
-    Effort { precision: Precision { substeps: 10, slack: 2e-4 }, jacobians: 12, least_gain: 1.0 };
+const COARSE_EFFORT: Effort = Effort {
+    precision: Precision { substeps: 4, slack: 5e-3 },
+    jacobians: 8,
+    least_gain: 1.0,
+    differences: Differences::OneSided,
+};
+const ROUGH_EFFORT: Effort = Effort {
+    precision: Precision { substeps: 5, slack: 2e-3 },
+    jacobians: 12,
+    least_gain: 1.0,
+    differences: Differences::OneSided,
+};
+const MIDDLE_EFFORT: Effort = Effort {
+    precision: Precision { substeps: 10, slack: 2e-4 },
+    jacobians: 12,
+    least_gain: 1.0,
+    differences: Differences::OneSided,
+};
 /// Of each of several beds, before the best of them is followed.
 const BEGUN_EFFORT: Effort = Effort { jacobians: 4, ..MIDDLE_EFFORT };
-const FINE_EFFORT: Effort =
-    Effort { precision: Precision { substeps: SUBSTEPS, slack: 5e-5 }, jacobians: 6, least_gain: 1.0 };
+const FINE_EFFORT: Effort = Effort {
+    precision: Precision { substeps: SUBSTEPS, slack: 5e-5 },
+    jacobians: 6,
+    least_gain: 1.0,
+    differences: Differences::OneSided,
+};
 
 /// Beds that are followed.
 const BEDS: usize = 3;
@@ -98,12 +114,33 @@ pub(super) fn fit(recordings: &[AxisRecording], resolution_mm: f64) -> Result<Fi
         Stages { runs: Runs::new(recordings, resolution_mm), accel_mm_s2: sustained_accel_mm_s2(recordings) };
     let too_late = IdentifyError::TooLate { limit_s: search.runs.lag_limit_s() };
     let starts = coarse(recordings, resolution_mm)?;
-    let (found, free) = search.best(&starts).ok_or(too_late.clone())?;
-    concluded(recordings, search.runs, &found, free).ok_or(too_late)?
+    let model = search.best(&starts).ok_or(too_late.clone())?;
+    concluded(recordings, search.runs, &model).ok_or(too_late)?
 }
 
-/// A model that was found, and its unknowns.
-type Model = (Found, &'static [Unknown]);
+/// A model that was found.
+struct Model {
+    found: Found,
+    free: &'static [Unknown],
+    /// Beside a rigid model: a bed that explains more, if not so much more that it is one.
+    unproven: Option<Unknowns>,
+}
+
+impl Model {
+    fn with_bed(found: Found) -> Self {
+        Self { found, free: &ALL, unproven: None }
+    }
+
+    fn rigid(found: Found, unproven: Option<&Found>) -> Self {
+        let is_heavy = |bed: &Unknowns| bed.get(Unknown::BedMassRatio) > LEAST_RATIO;
+        let unproven = unproven.map(|bed| bed.unknowns).filter(is_heavy);
+        Self { found, free: without_bed(), unproven }
+    }
+
+    fn has_bed(&self) -> bool {
+        self.free.len() == ALL.len()
+    }
+}
 
 struct Stages {
     runs: Runs,
@@ -132,15 +169,15 @@ impl Stages {
         let middle = self.stage(rough.unknowns, without_bed(), MIDDLE_EFFORT)?;
         let is_rigid = is_met(&self.runs, &middle);
         let model = if is_rigid { self.rigid_first(&middle) } else { self.bed_first(&middle) }?;
-        if model.0.misfit() < FOLLOWED_WELL * self.readings() {
+        if model.found.misfit() < FOLLOWED_WELL * self.readings() {
             return Some(model);
         }
         let Some(bed) = self.other_beds(starts) else { return Some(model) };
         // Readings were grouped anew.
-        let before = (settled(&self.runs, &model.0, model.1)?, model.1);
+        let before = Model { found: settled(&self.runs, &model.found, model.free)?, ..model };
         let other = match self.rigid_from(&bed) {
             Some(rigid) => self.decided(rigid, bed),
-            None => finished(&self.runs, bed, &ALL).map(|bed| (bed, &ALL[..])),
+            None => finished(&self.runs, bed, &ALL).map(Model::with_bed),
         };
         Some(match other {
             Some(other) => self.better(before, other),
@@ -150,11 +187,10 @@ impl Stages {
 
     /// The one that explains more; a bed has to explain enough.
     fn better(&self, one: Model, other: Model) -> Model {
-        let has_bed = |model: &Model| model.1.len() == ALL.len();
-        let is_other = match (has_bed(&one), has_bed(&other)) {
-            (false, true) => self.is_bed(&one.0, &other.0),
-            (true, false) => !self.is_bed(&other.0, &one.0),
-            _ => other.0.misfit() < one.0.misfit(),
+        let is_other = match (one.has_bed(), other.has_bed()) {
+            (false, true) => self.is_bed(&one.found, &other.found),
+            (true, false) => !self.is_bed(&other.found, &one.found),
+            _ => other.found.misfit() < one.found.misfit(),
         };
         if is_other { other } else { one }
     }
@@ -196,8 +232,8 @@ impl Stages {
         let found = promising.filter_map(|(start, _)| search(&self.runs, start, &ALL, LAST_EFFORT));
         let bed = least(found.chain(known)).filter(|bed| self.gain(&rigid, bed) > PROMISE);
         Some(match bed.and_then(|bed| finished(&self.runs, bed, &ALL)) {
-            Some(bed) if self.is_bed(&rigid, &bed) => (bed, &ALL),
-            _ => (rigid, without_bed()),
+            Some(bed) if self.is_bed(&rigid, &bed) => Model::with_bed(bed),
+            bed => Model::rigid(rigid, bed.as_ref()),
         })
     }
 
@@ -216,7 +252,7 @@ impl Stages {
             && beside.is_none()
         {
             // The rigid model misses it by far, wherever it starts.
-            return Some((finished(&self.runs, bed, &ALL)?, &ALL));
+            return finished(&self.runs, bed, &ALL).map(Model::with_bed);
         }
         let rigid = least([self.last(middle.unknowns, without_bed()), beside].into_iter().flatten())?;
         self.decided(rigid, bed)
@@ -237,7 +273,8 @@ impl Stages {
         if is_bed || is_near {
             bed = finished(&self.runs, bed, &ALL)?;
         }
-        Some(if self.is_bed(&rigid, &bed) { (bed, &ALL) } else { (rigid, without_bed()) })
+        let is_bed = self.is_bed(&rigid, &bed);
+        Some(if is_bed { Model::with_bed(bed) } else { Model::rigid(rigid, Some(&bed)) })
     }
 
     /// Where nothing follows: beds of all frequencies, from the start.
@@ -295,8 +332,7 @@ fn limited(runs: &Runs, start: Unknowns, accel_mm_s2: f64, precision: Precision)
 fn concluded(
     recordings: &[AxisRecording],
     mut runs: Runs,
-    found: &Found,
-    free: &[Unknown],
+    &Model { ref found, free, unproven }: &Model,
 ) -> Option<Result<Fit, IdentifyError>> {
     runs.regroup(&found.unknowns, SUBSTEPS);
     let mut found = settled(&runs, found, free)?;
@@ -314,7 +350,8 @@ fn concluded(
         Err(error) => return Some(Err(error)),
     };
     let left = if is_met { 0.0 } else { misfit - readings };
-    let confidence = confidence(&mut runs, &found, free, left)?;
+    let unproven = unproven.and_then(|bed| search(&runs, bed, &ALL, SETTLING_EFFORT));
+    let confidence = confidence(&mut runs, &found, free, unproven.as_ref(), left)?;
     let tick_s = recordings[0].tick_s;
     Some(Ok(Fit {
         parameters: estimates(&confidence, &found, tick_s),

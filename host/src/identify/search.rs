@@ -35,10 +35,30 @@ pub(super) struct Effort {
     pub(super) jacobians: usize,
     /// The gain in misfit below which it ends.
     pub(super) least_gain: f64,
+    pub(super) differences: Differences,
+}
+
+/// What derivatives are made from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Differences {
+    /// From one side: half of the simulations.
+    OneSided,
+    /// From one side until a Jacobian gains less than [`NEAR_GAIN`], then from both.
+    CentralAtEnd,
+    /// From both sides.
+    Central,
 }
 
 /// That of the last stage.
-pub(super) const LAST_EFFORT: Effort = Effort { precision: Precision::LAST, jacobians: 25, least_gain: 0.02 };
+pub(super) const LAST_EFFORT: Effort = Effort {
+    precision: Precision::LAST,
+    jacobians: 25,
+    least_gain: 0.02,
+    differences: Differences::CentralAtEnd,
+};
+
+/// The gain in misfit of a Jacobian from which the end is far, and derivatives need not be exact.
+const NEAR_GAIN: f64 = 10.0;
 
 /// The one with the least misfit.
 pub(super) fn least(found: impl Iterator<Item = Found>) -> Option<Found> {
@@ -60,13 +80,14 @@ const STEPS_PER_JACOBIAN: usize = 5;
 /// ... while each gains this part of the misfit.
 const SAME_JACOBIAN: f64 = 2e-3;
 
-/// The model's derivatives about `unknowns`, as residuals by free unknown, and the residuals there. Where there is slack, from
-/// one side: half of the simulations.
+/// The model's derivatives about `unknowns`, as residuals by free unknown, and the residuals there. Those that are not central
+/// take half of the simulations.
 pub(super) fn derivatives(
     runs: &Runs,
     unknowns: &Unknowns,
     free: &[Unknown],
-    precision: Precision,
+    substeps: u32,
+    is_central: bool,
 ) -> Option<(Vec<Residuals>, Residuals)> {
     let lag_limit_s = runs.lag_limit_s();
     let neighbour = |unknown: Unknown, step: f64| {
@@ -78,17 +99,17 @@ pub(super) fn derivatives(
     let pair = |unknown: Unknown| {
         let step = unknown.difference();
         let [up, down] = [step, -step].map(|step| neighbour(unknown, step));
-        if precision.slack > 0.0 {
-            if up == *unknowns { [down, *unknowns] } else { [up, *unknowns] }
-        } else {
-            [up, down]
+        match is_central {
+            true => [up, down],
+            false if up == *unknowns => [down, up],
+            false => [up, *unknowns],
         }
     };
     let pairs: Vec<[Unknowns; 2]> = free.iter().map(|unknown| pair(*unknown)).collect();
     // Each set once.
     let others = pairs.iter().flatten().filter(|set| *set != unknowns);
     let sets: Vec<Unknowns> = [*unknowns].into_iter().chain(others.copied()).collect();
-    let mut all = runs.residuals(&sets, precision.substeps).into_iter();
+    let mut all = runs.residuals(&sets, substeps).into_iter();
     let still = all.next()??;
     let mut columns = Vec::with_capacity(free.len());
     for (&unknown, pair) in free.iter().zip(&pairs) {
@@ -106,14 +127,15 @@ pub(super) fn derivatives(
 
 /// Searches from `start` over the `free` unknowns; `None` if the start can't be simulated.
 pub(super) fn search(runs: &Runs, start: Unknowns, free: &[Unknown], effort: Effort) -> Option<Found> {
-    let Effort { precision, jacobians, least_gain } = effort;
+    let Effort { precision, jacobians, least_gain, differences } = effort;
+    let mut is_central = differences == Differences::Central;
     let weights = runs.weights(precision);
     let readings = runs.readings();
     let mut damping = 1e-3;
     let mut found: Option<Found> = None;
     for _ in 0..jacobians {
         let unknowns = found.as_ref().map_or(start, |found| found.unknowns);
-        let (columns, residuals) = derivatives(runs, &unknowns, free, precision)?;
+        let (columns, residuals) = derivatives(runs, &unknowns, free, precision.substeps, is_central)?;
         let mut sums = weights.sums(&columns, &residuals);
         let misfits = weights.misfits(&residuals);
         let mut best = Found { unknowns, residuals, misfits, rivals: Vec::new() };
@@ -150,7 +172,9 @@ pub(super) fn search(runs: &Runs, start: Unknowns, free: &[Unknown], effort: Eff
         let gain = first - best.misfit();
         let least_gain = least_gain.max(LEAST_PART * (best.misfit() - readings));
         found = Some(best);
-        if !(gain > least_gain) {
+        if differences == Differences::CentralAtEnd && !is_central {
+            is_central = !(gain > NEAR_GAIN);
+        } else if !(gain > least_gain) {
             break;
         }
         damping = damping.clamp(1e-8, 1.0);

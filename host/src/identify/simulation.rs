@@ -166,7 +166,10 @@ impl Model {
         let is_moment = is_frozen != state.is_frozen;
         state.is_frozen = is_frozen;
         state.demand = demand;
-        let limited = core::array::from_fn(|lane| demand[lane].min(self.limit[lane]).max(-self.limit[lane]));
+        let mut limited = demand;
+        for (limited, limit) in limited.iter_mut().zip(&self.limit) {
+            *limited = limited.min(*limit).max(-limit);
+        }
         self.push(state, &error, &runs, &limited);
         self.travel(state, |lane, pushed| pushed.min(self.coulomb_step[lane]).max(-self.coulomb_step[lane]));
         is_moment
@@ -189,15 +192,15 @@ impl Model {
     /// The commands in one sub-step of a tick.
     #[inline(always)]
     pub(super) fn delayed_in(&self, Delayed { earlier, late }: &Delayed, step: u32) -> Lane {
-        core::array::from_fn(|lane| {
+        let mut delayed = *late;
+        for (lane, delayed) in delayed.iter_mut().enumerate() {
             if step < self.whole_steps[lane] {
-                earlier[lane]
+                *delayed = earlier[lane];
             } else if step == self.whole_steps[lane] {
-                late[lane] + self.fraction[lane] * (earlier[lane] - late[lane])
-            } else {
-                late[lane]
+                *delayed += self.fraction[lane] * (earlier[lane] - late[lane]);
             }
-        })
+        }
+        delayed
     }
 }
 

@@ -5,14 +5,15 @@
 //! way. What leads back to a valley that is known is left early.
 
 use super::cholesky::Symmetric;
-use super::confidence::floor;
+use super::confidence::{distance2, floor};
 use super::parameters::{Unknown, Unknowns};
 use super::readings::{Precision, Runs};
-use super::search::{Effort, Found, LAST_EFFORT, derivatives, is_met, search};
+use super::search::{Differences, Effort, Found, LAST_EFFORT, derivatives, is_met, search};
+use super::simulation::SUBSTEPS;
 
 /// Over to a valley that answers alike, before it is judged.
 pub(super) const EXCHANGED_EFFORT: Effort =
-    Effort { precision: Precision::LAST, jacobians: 4, least_gain: 10.0 };
+    Effort { precision: Precision::LAST, jacobians: 4, least_gain: 10.0, differences: Differences::OneSided };
 /// A valley that is this much worse after a few steps is left.
 pub(super) const NEAR: f64 = 3e4;
 /// An end that is less than this worse is a rival: chance prefers the wrong one in one of a hundred cases.
@@ -29,15 +30,17 @@ const PARABOLA: f64 = 4.0;
 const SAME: f64 = 1.0;
 
 /// Once more, of readings that were grouped or weighed anew.
-pub(super) const SETTLING_EFFORT: Effort = Effort { jacobians: 5, ..LAST_EFFORT };
+pub(super) const SETTLING_EFFORT: Effort =
+    Effort { jacobians: 5, differences: Differences::Central, ..LAST_EFFORT };
 
 /// Kicks along the floor, in standard deviations, and the gain in misfit for which what follows is searched.
 const KICKS: [f64; 4] = [-30.0, -9.0, 9.0, 30.0];
-const KICKED_EFFORT: Effort = Effort { precision: Precision::LAST, jacobians: 2, least_gain: 10.0 };
+const KICKED_EFFORT: Effort =
+    Effort { precision: Precision::LAST, jacobians: 2, least_gain: 10.0, differences: Differences::Central };
 const KICK_GAIN: f64 = 0.5;
 /// The same where the model does not follow: the floor is curved there, and a search stops far from its end.
 const FAR_KICKS: [f64; 6] = [-100.0, -30.0, -9.0, 9.0, 30.0, 100.0];
-const FAR_EFFORT: Effort = Effort { jacobians: 6, ..KICKED_EFFORT };
+const FAR_EFFORT: Effort = Effort { jacobians: 6, differences: Differences::OneSided, ..KICKED_EFFORT };
 /// Most kicks after each other.
 const KICKED_ROUNDS: usize = 4;
 
@@ -110,18 +113,14 @@ struct Valley {
 
 impl Valley {
     fn of(runs: &Runs, end: Found, free: &[Unknown]) -> Option<Self> {
-        let (columns, residuals) = derivatives(runs, &end.unknowns, free, Precision::LAST)?;
+        let (columns, residuals) = derivatives(runs, &end.unknowns, free, SUBSTEPS, true)?;
         let information = runs.weights(Precision::LAST).sums(&columns, &residuals).normal;
         Some(Self { end, information })
     }
 
     /// By how much a place is worse than the end, if the floor is a parabola.
     fn rise(&self, to: &Unknowns, free: &[Unknown]) -> f64 {
-        let off: Vec<f64> = free.iter().map(|unknown| unknown.distance(&self.end.unknowns, to)).collect();
-        let row = |row: usize| -> f64 {
-            off.iter().enumerate().map(|(column, by)| self.information.at(row, column) * by).sum()
-        };
-        off.iter().enumerate().map(|(index, by)| by * row(index)).sum()
+        distance2(&self.information, free, &self.end.unknowns, to)
     }
 
     /// Whether a place may lie in the valley: it is no lower there than the parabola tells. It is higher where a search is

@@ -125,8 +125,8 @@ impl WholeTicks {
             Regime::Saturated => &self.saturated,
         };
         let from = state.to_column();
-        let inputs =
-            [delayed.earlier, delayed.late, state.velocity.map(f64::signum), start.demand.map(f64::signum)];
+        let mut inputs = [delayed.earlier, delayed.late, state.velocity, start.demand];
+        inputs[2..].iter_mut().flatten().for_each(|value| *value = value.signum());
         let mut by = [f64x4::ZERO; COLUMNS];
         for (by, state) in by.iter_mut().zip(&from[OUTPUTS..R]) {
             *by = f64x4::from(*state);
@@ -147,12 +147,12 @@ impl WholeTicks {
                 column[BLOCK * block + row] = sums[row].to_array();
             }
         }
-        let end = State { is_frozen: state.is_frozen, ..State::of_column(&column) };
+        let mut end = State { is_frozen: state.is_frozen, ..State::of_column(&column) };
         if !start.is_without_events(regime, model, state, &end, self.tick_s) {
             return false;
         }
-        let position = core::array::from_fn(|lane| state.position[lane] + end.position[lane]);
-        *state = State { position, ..end };
+        end.position.iter_mut().zip(state.position).for_each(|(by, from)| *by += from);
+        *state = end;
         true
     }
 }

@@ -14,7 +14,7 @@ use super::driven::Worst;
 use super::{assert_none, judged, planned, rounded, seeds};
 
 /// Programs, by seeds; and those whose ticks are looked at, some hundred thousand each.
-const LONG: u64 = 12;
+const LONG: u64 = 6;
 const DRIVEN: u64 = 4;
 
 /// Moves without a stop for some sections, slow enough that a few hundred take more than one.
