@@ -30,8 +30,10 @@ const FASTEST_MM_S: f64 = 10.0 * REFERENCE_MM_S_PER_VOLT;
 pub const HALF_WIDTHS_MAX: f64 = 4.0;
 /// The mass ratio up to which a bed may be missed: it moves the axis by less than recordings tell.
 pub const MISSED_RATIO_MAX: f64 = 0.035;
-/// What margins may be off by, as a part of the true ones.
+/// What margins may be off by, as a part of the true ones ...
 pub const MARGINS_OFF_MAX: f64 = 0.02;
+/// ... and where their intervals say that the recordings do not tell them as well: half-widths.
+pub const MARGINS_HALF_WIDTHS_MAX: f64 = 2.0;
 
 /// An axis that was drawn.
 #[derive(Clone, Copy, Debug)]
@@ -133,6 +135,16 @@ impl Compared {
         (self.found.value - self.truth).abs() / self.found.half_width_95
     }
 
+    /// |found − true| as a part of what is true. What is infinite in both is not off.
+    #[must_use]
+    pub fn part_off(&self) -> f64 {
+        if self.found.value.total_cmp(&self.truth).is_eq() {
+            0.0
+        } else {
+            (self.found.value / self.truth - 1.0).abs()
+        }
+    }
+
     fn words(&self) -> String {
         let (name, off, Estimate { value, half_width_95 }) = (self.name, self.half_widths_off(), self.found);
         format!(
@@ -182,9 +194,9 @@ pub struct Surveyed {
     pub has_bed: bool,
     /// Whether it says that the model explains the recordings.
     pub is_met: bool,
-    /// The margins of the loop that is proposed: as they are claimed, and those of the drive as it is. Without, tuning
-    /// was refused.
-    pub margins: Option<[Margins; 2]>,
+    /// Phase margin \[°\] and gain margin of the loop that is proposed, and those of the drive as it is. Without, tuning was
+    /// refused.
+    pub margins: Option<[Compared; 2]>,
     /// Circles before and after tuning; none without a tuning.
     pub circles: Circles,
     /// Time that it took \[s\]: of the processor, where the system tells it.
@@ -230,20 +242,12 @@ impl Surveyed {
                 _ => {}
             }
         }
-        if let Some(margins @ [claimed, is]) = &self.margins
-            && let off = margins_off(margins)
-            && !(off <= MARGINS_OFF_MAX)
-        {
-            let bed = self.axis.drive.bed.map_or_else(String::new, |bed| format!(", {}", bed_words(bed)));
-            wrong.push(format!(
-                "margins off by {:.1} %, phase {:.2}°, is {:.2}°, gain {:.3}, is {:.3}{bed}",
-                100.0 * off,
-                claimed.phase_deg,
-                is.phase_deg,
-                claimed.gain,
-                is.gain
-            ));
-        }
+        let bed = self.axis.drive.bed.map_or_else(String::new, |bed| format!(", {}", bed_words(bed)));
+        let margins = self.margins.iter().flatten();
+        let margins = margins.filter(|one| {
+            !(one.part_off() <= MARGINS_OFF_MAX) && !(one.half_widths_off() <= MARGINS_HALF_WIDTHS_MAX)
+        });
+        wrong.extend(margins.map(|one| format!("{}{bed}", one.words())));
         wrong.extend(self.circles.worse.iter().cloned());
         wrong
     }
@@ -285,9 +289,13 @@ pub fn surveyed(seed: u64, circles_hz: &[f64]) -> Surveyed {
     let has_bed = found.as_ref().is_ok_and(|found| found.parameters.bed.is_some());
     let is_met = found.as_ref().is_ok_and(Identification::is_met);
     let tuned = found.as_ref().ok().and_then(|found| Some((found, tuning(&axis, found)?)));
-    let margins = tuned
-        .as_ref()
-        .map(|(_, tuning)| [tuning.margins, Margins::of(&axis.drive, tuning.gains, REFERENCE_TICK_S)]);
+    let margins = tuned.as_ref().map(|(_, tuning)| {
+        let is = Margins::of(&axis.drive, tuning.gains, REFERENCE_TICK_S);
+        [
+            Compared { name: "phase margin", truth: is.phase_deg, found: tuning.phase_margin_deg },
+            Compared { name: "gain margin", truth: is.gain, found: tuning.gain_margin },
+        ]
+    });
     let circles =
         tuned.map_or_else(Circles::default, |(found, tuning)| circles(&axis, found, &tuning, circles_hz));
     let found = match found {
@@ -346,13 +354,6 @@ fn circles(axis: &RandomAxis, found: &Identification, tuning: &AxisTuning, circl
     circles
 }
 
-/// By how much phase and gain margin are off, as a part of the true ones.
-fn margins_off([claimed, is]: &[Margins; 2]) -> f64 {
-    // The gain margin of a loop without any is infinite in both.
-    let off = |claimed: f64, is: f64| if claimed == is { 0.0 } else { (claimed / is - 1.0).abs() };
-    off(claimed.phase_deg, is.phase_deg).max(off(claimed.gain, is.gain))
-}
-
 /// The time that this thread has had of a processor \[s\]; of the clock where the system does not tell.
 fn processor_s() -> f64 {
     let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
@@ -400,11 +401,17 @@ pub fn report(all: &[Surveyed]) -> String {
         "| not tuned: too little is determined | {} |",
         count(&mut all.iter().filter(|one| one.margins.is_none()))
     ));
-    let margins: Vec<f64> = all.iter().filter_map(|one| one.margins.as_ref()).map(margins_off).collect();
-    let worst_part = 100.0 * margins.iter().copied().fold(0.0, f64::max);
+    let margins: Vec<&Compared> = all.iter().filter_map(|one| one.margins.as_ref()).flatten().collect();
+    let worst_part = 100.0 * margins.iter().map(|one| one.part_off()).fold(0.0, f64::max);
     line(format!(
         "| margins off by over 2 % (at most {worst_part:.2} %) | {} |",
-        margins.iter().filter(|off| !(**off <= MARGINS_OFF_MAX)).count()
+        margins.iter().filter(|one| !(one.part_off() <= MARGINS_OFF_MAX)).count()
+    ));
+    let told = margins.iter().filter(|one| one.found.half_width_95.is_finite()).count();
+    let within = margins.iter().filter(|one| one.part_off() == 0.0 || one.half_widths_off() <= 1.0).count();
+    line(format!(
+        "| margins within their 95 % interval, of {told} | {:.1} % |",
+        100.0 * within as f64 / told.max(1) as f64
     ));
     let circles = |of: fn(&Circles) -> usize| all.iter().map(|one| of(&one.circles)).sum::<usize>();
     line(String::new());

@@ -360,11 +360,11 @@ const CIRCLES_HZ: [f64; 2] = [4.0, 16.0];
 /// direction in which filter, gain and current loop trade is flat there but for the drive's steps. The search for 76
 /// stops far from its end, along a floor that is curved. 245 is in a valley from which only another wrong one is seen. The
 /// bed of 255 gains little. The axis of 476 stops and starts again by itself. 521 had a bed that is not there: the rigid
-/// model had gone astray. The bed of 940 gains less than chance may, and moves the other parameters all the same.
+/// model had gone astray. Of 337 a wrong place was found twice, which hid the right one.
 /// `cargo bench -p motion-tests --bench identify -- 0 1000` surveys as many as one likes; `docs/DRIVES.md` is what it said.
 #[test]
 fn random_drives_are_found_and_tuned() {
-    let (mut driven, seeds) = (0, (0..10).chain([76, 245, 255, 476, 521, 940, 1017]));
+    let (mut driven, seeds) = (0, (0..10).chain([76, 245, 255, 337, 476, 521, 1017]));
     let circles = seeds.clone().count() * CIRCLES_HZ.len();
     for seed in seeds {
         let one = surveyed(seed, &CIRCLES_HZ);

@@ -24,6 +24,12 @@ impl Symmetric {
         &mut self.cells[row * self.order + column]
     }
 
+    /// vᵀ·A·v.
+    pub(super) fn quadratic_form(&self, v: &[f64]) -> f64 {
+        let row = |row: usize| (0..self.order).map(|column| self.at(row, column) * v[column]).sum::<f64>();
+        (0..self.order).map(|index| v[index] * row(index)).sum()
+    }
+
     /// The lower factor L of LLᵀ; `None` if the matrix is not positive.
     pub(super) fn factor(&self) -> Option<Lower> {
         let n = self.order;
@@ -135,6 +141,10 @@ mod tests {
         let inverse = positive.inverse().unwrap();
         let unit: f64 = (0..3).map(|k| positive.at(0, k) * inverse.at(k, 0)).sum();
         assert!((unit - 1.0).abs() < 1e-12);
+        // 4 + 5·4 + 3·9 + 2·(2·2 − 3 + 0.5·6), and a determinant of 4·(15 − 0.25) − 2·(6 + 0.5) − (1 + 5).
+        assert!((positive.quadratic_form(&[1.0, 2.0, 3.0]) - 59.0).abs() < 1e-12);
+        let log_determinant = positive.factor().unwrap().log_determinant();
+        assert!((log_determinant - 0.5 * 40.0_f64.ln()).abs() < 1e-12, "{log_determinant}");
     }
 
     #[test]

@@ -14,14 +14,15 @@
 //! weakest directions are looked at over a standard deviation instead: what little changes over that is what tells.
 //!
 //! Intervals of what is made from several unknowns, and of what has a bound, are not those of a parabola. So
-//! samples are drawn from the covariance, cut to the bounds, and the interval is what holds 95 of 100.
+//! samples are drawn from the covariance, cut to the bounds, and the interval is what holds 95 of 100. Searches that end in
+//! other places, and a bed that is not told from chance, have their share of the samples, by their likelihood.
 
-use super::Estimate;
 use super::cholesky::{Lower, Symmetric};
-use super::parameters::{ALL, Unknown, Unknowns, without_bed};
+use super::parameters::{ALL, Unknown, Unknowns, way};
 use super::readings::{Precision, Residuals, Runs, Weights, dot};
 use super::search::{Found, derivatives};
 use super::simulation::SUBSTEPS;
+use super::{Alternatives, Estimate};
 use crate::chance::Chance;
 
 /// Lags over which autocorrelation is summed at most.
@@ -48,6 +49,8 @@ const PROMISED: f64 = 0.9;
 
 /// Samples that intervals are read from: their ends are good to a thirtieth.
 const SAMPLES: usize = 2000;
+/// And those that are handed on: intervals are good to an eighth.
+const ALTERNATIVES: usize = 32;
 
 /// The autocorrelation of all runs' residuals, by lag; 0 where there are none.
 fn autocorrelation(runs: &[&[f64]]) -> impl Fn(usize) -> f64 {
@@ -85,6 +88,9 @@ pub(super) struct Confidence {
     widening: f64,
 }
 
+/// Ends of searches that are nearer to each other are one place: standard deviations, squared.
+const ONE_PLACE: f64 = 1.0;
+
 /// Where the recordings may be from: the end of a search, and how wide its valley is.
 struct Place<'a> {
     centre: Unknowns,
@@ -93,11 +99,22 @@ struct Place<'a> {
     information: Symmetric,
     /// Of the covariance.
     factor: Lower,
-    log_volume: f64,
+}
+
+/// A bed beside a rigid model, which recordings do not tell from chance.
+pub(super) struct UnprovenBed {
+    pub(super) unknowns: Unknowns,
+    /// Logarithm of its likelihood over that of the rigid model, by Schwarz.
+    pub(super) log_likelihood: f64,
 }
 
 impl<'a> Place<'a> {
-    fn of(runs: &Runs, weights: &Weights, centre: Unknowns, free: &'a [Unknown]) -> Option<Self> {
+    fn new(centre: Unknowns, free: &'a [Unknown], misfit: f64, information: Symmetric) -> Option<Self> {
+        let factor = inverse_factor(&information)?;
+        Some(Self { centre, free, misfit, information, factor })
+    }
+
+    fn linearised(runs: &Runs, weights: &Weights, centre: Unknowns, free: &'a [Unknown]) -> Option<Self> {
         let (mut columns, residuals) = derivatives(runs, &centre, free, SUBSTEPS, true)?;
         let misfit = weights.misfits(&residuals).iter().sum();
         widen(runs, weights, &centre, free, &mut columns, &residuals);
@@ -106,14 +123,19 @@ impl<'a> Place<'a> {
             // An unknown that no run shows ends with this width, far beyond what counts as determined.
             *information.at_mut(index, index) += unknown.ignorance().powi(-2);
         }
-        let factor = inverse_factor(&information)?;
-        let log_volume = factor.log_determinant();
-        Some(Self { centre, free, misfit, information, factor, log_volume })
+        Self::new(centre, free, misfit, information)
     }
 
-    /// Whether another end is the same place: within a standard deviation.
-    fn holds(&self, other: &Unknowns, free: &[Unknown]) -> bool {
-        free.len() == self.free.len() && distance2(&self.information, free, &self.centre, other) < 1.0
+    /// Whether the end of another search is the same place.
+    fn is_at(&self, other: &Unknowns) -> bool {
+        self.information.quadratic_form(&way(self.free, &self.centre, other)) < ONE_PLACE
+    }
+
+    /// The logarithm of its likelihood over that of another place with as many unknowns, by Laplace: a wide valley counts
+    /// for more.
+    fn log_likelihood(&self, other: &Place) -> f64 {
+        let wider = self.factor.log_determinant() - other.factor.log_determinant();
+        wider - 0.5 * (self.misfit - other.misfit)
     }
 
     fn sample(&self, chance: &mut Chance, lag_limit_s: f64) -> Unknowns {
@@ -125,23 +147,13 @@ impl<'a> Place<'a> {
     }
 }
 
-/// dᵀ·information·d for the way d between two places, in the coordinates of the `free` unknowns: by how much misfit rises
-/// along it, if its floor is a parabola.
-pub(super) fn distance2(information: &Symmetric, free: &[Unknown], from: &Unknowns, to: &Unknowns) -> f64 {
-    let off: Vec<f64> = free.iter().map(|unknown| unknown.distance(from, to)).collect();
-    let row = |row: usize| -> f64 {
-        off.iter().enumerate().map(|(column, by)| information.at(row, column) * by).sum()
-    };
-    off.iter().enumerate().map(|(index, by)| by * row(index)).sum()
-}
-
 /// The confidence of what a search over the `free` unknowns found, with weights that are up to date; `None` if it
-/// can't be linearised. Beside a rigid model, an `unproven` bed counts by what the recordings say for it.
+/// can't be linearised.
 pub(super) fn confidence(
     runs: &mut Runs,
     found: &Found,
     free: &[Unknown],
-    unproven: Option<&Found>,
+    unproven: Option<&UnprovenBed>,
     left: f64,
 ) -> Option<Confidence> {
     let whitened = runs.weights(Precision::LAST).whitened(&found.residuals);
@@ -155,37 +167,34 @@ pub(super) fn confidence(
     runs.scale_variances(&counted);
     let weights = runs.weights(Precision::LAST);
     let lag_limit_s = runs.lag_limit_s();
-    let bed_price = (ALL.len() - without_bed().len()) as f64 * libm::log(runs.readings());
-    let alike = [found.unknowns].into_iter().chain(found.rivals.iter().copied());
-    let alike = alike.map(|centre| (centre, free, 0.0));
-    let centres = alike.chain(unproven.map(|bed| (bed.unknowns, &ALL[..], bed_price)));
-    let mut places: Vec<Place> = Vec::new();
-    for (centre, free, price) in centres {
-        if places.iter().any(|place| place.holds(&centre, free)) {
+    let place = |centre: &Unknowns, free| Place::linearised(runs, &weights, *centre, free);
+    let mut places = vec![(place(&found.unknowns, free)?, 0.0)];
+    for rival in &found.rivals {
+        if places.iter().any(|(place, _)| place.is_at(rival)) {
             continue;
         }
-        match Place::of(runs, &weights, centre, free) {
-            Some(place) => places.push(Place { misfit: place.misfit + price, ..place }),
-            // A rival that can't be linearised is none.
-            None if centre != found.unknowns => {}
-            None => return None,
-        }
+        // A rival that can't be linearised is none.
+        let rival = place(rival, free);
+        places.extend(rival.map(|rival| {
+            let log_likelihood = rival.log_likelihood(&places[0].0);
+            (rival, log_likelihood)
+        }));
     }
-    // Of valleys with as many unknowns a wide one counts for more. The price of a bed stands for what its unknowns may be.
-    let best = places.first()?;
-    let log_likelihood = |place: &Place| {
-        let log_volume = if place.free.len() == best.free.len() { place.log_volume } else { best.log_volume };
-        log_volume - 0.5 * place.misfit
-    };
+    places.extend(unproven.and_then(|bed| Some((place(&bed.unknowns, &ALL)?, bed.log_likelihood))));
+    let samples = samples(&places, lag_limit_s);
+    Some(Confidence { best: found.unknowns, samples, widening: 1.0 + left.max(0.0).sqrt() / 1.96 })
+}
+
+/// Samples of places with their log-likelihoods over the first one's. That was found, and by more than its misfit: a filter has
+/// to be worth its unknown. So none has more samples.
+fn samples(places: &[(Place, f64)], lag_limit_s: f64) -> Vec<Unknowns> {
     let mut chance = Chance(0x1DE7);
     let mut samples = Vec::new();
-    for place in &places {
-        // What was found was chosen by more than its misfit: a filter has to be worth its unknown.
-        let share = libm::exp((log_likelihood(place) - log_likelihood(best)).min(0.0));
-        let count = (share * SAMPLES as f64) as usize;
+    for (place, log_likelihood) in places {
+        let count = (libm::exp(log_likelihood.min(0.0)) * SAMPLES as f64) as usize;
         samples.extend((0..count).map(|_| place.sample(&mut chance, lag_limit_s)));
     }
-    Some(Confidence { best: found.unknowns, samples, widening: 1.0 + left.max(0.0).sqrt() / 1.96 })
+    samples
 }
 
 /// One standard deviation along the direction that is fixed worst, in the coordinates of the `free` unknowns.
@@ -330,6 +339,13 @@ fn inverse_factor(information: &Symmetric) -> Option<Lower> {
 }
 
 impl Confidence {
+    /// Some of the samples, by the shares of their places.
+    pub(super) fn alternatives(&self) -> Alternatives {
+        let every = (self.samples.len() / ALTERNATIVES).max(1);
+        let drives = self.samples.iter().step_by(every).map(Unknowns::drive).collect();
+        Alternatives { drives, widening: self.widening }
+    }
+
     /// A value with its interval; `of` makes it from the unknowns.
     pub(super) fn estimate(&self, of: impl Fn(&Unknowns) -> f64) -> Estimate {
         let value = of(&self.best);
@@ -342,7 +358,7 @@ impl Confidence {
 #[cfg(test)]
 mod tests {
     use super::super::fixtures::{TICK_S, recorded, sticking};
-    use super::super::simulation::SUBSTEPS;
+    use super::super::parameters::without_bed;
     use super::*;
 
     #[test]
@@ -383,6 +399,18 @@ mod tests {
     /// make each other good, but not where the model does not follow.
     #[test]
     fn intervals_of_a_quiet_axis_are_narrower() {
+        let (runs, found) = quiet();
+        let free = [Unknown::Gain, Unknown::Offset, Unknown::Lag];
+        let half_width = |left: f64| {
+            let confidence = confidence(&mut runs.clone(), &found, &free, None, left).expect("a confidence");
+            confidence.estimate(|unknowns| unknowns.get(Unknown::Gain)).half_width_95
+        };
+        let part = half_width(0.0) / half_width(f64::MIN_POSITIVE);
+        assert!((SCATTER_MIN.sqrt() - 1e-9..0.8).contains(&part), "{part}");
+    }
+
+    /// An axis on a bed that moves by part of a count from tick to tick, and what it is.
+    fn quiet() -> (Runs, Found) {
         const RESOLUTION_MM: f64 = 1e-3;
         let unknowns = sticking();
         let feed = |tick: usize| 40.0 * libm::sin(core::f64::consts::TAU * 3.0 * TICK_S * tick as f64);
@@ -391,14 +419,62 @@ mod tests {
         runs.regroup(&unknowns, SUBSTEPS);
         let residuals = runs.residuals(&[unknowns], SUBSTEPS).remove(0).expect("numbers");
         let misfits = runs.weights(Precision::LAST).misfits(&residuals);
-        let found = Found { unknowns, residuals, misfits, rivals: Vec::new() };
-        let free = [Unknown::Gain, Unknown::Offset, Unknown::Lag];
-        let half_width = |left: f64| {
-            let confidence = confidence(&mut runs.clone(), &found, &free, None, left).expect("a confidence");
-            confidence.estimate(|unknowns| unknowns.get(Unknown::Gain)).half_width_95
+        (runs, Found { unknowns, residuals, misfits, rivals: Vec::new() })
+    }
+
+    #[test]
+    fn intervals_span_a_bed_that_is_not_proven() {
+        let (runs, found) = quiet();
+        let gain = found.unknowns.get(Unknown::VelocityGain);
+        let half_width = |log_likelihood: Option<f64>| {
+            let unknowns = found.unknowns.shifted(Unknown::VelocityGain, 0.05);
+            let bed = log_likelihood.map(|log_likelihood| UnprovenBed { unknowns, log_likelihood });
+            let confidence = confidence(&mut runs.clone(), &found, without_bed(), bed.as_ref(), 0.0);
+            confidence
+                .expect("a confidence")
+                .estimate(|unknowns| unknowns.get(Unknown::VelocityGain))
+                .half_width_95
         };
-        let part = half_width(0.0) / half_width(f64::MIN_POSITIVE);
-        assert!((SCATTER_MIN.sqrt() - 1e-9..0.8).contains(&part), "{part}");
+        let alone = half_width(None);
+        assert!(alone < 0.04 * gain, "{alone}");
+        assert!(half_width(Some(0.0)) > 0.05 * gain);
+        assert!((half_width(Some(-9.0)) / alone - 1.0).abs() < 0.01);
+    }
+
+    /// A place off by `offset`, and its standard deviation there.
+    fn place(free: &'static [Unknown], offset: f64, deviation: f64, misfit: f64) -> Place<'static> {
+        let mut information = Symmetric::zero(free.len());
+        for index in 0..free.len() {
+            *information.at_mut(index, index) = deviation.powi(-2);
+        }
+        let centre = sticking().shifted(Unknown::Offset, offset);
+        Place::new(centre, free, misfit, information).expect("a place")
+    }
+
+    #[test]
+    fn places_count_by_misfit_and_width() {
+        const FREE: [Unknown; 1] = [Unknown::Offset];
+        let first = || place(&FREE, 0.0, 0.1, 100.0);
+        let log = |other: Place| other.log_likelihood(&first());
+        assert!((log(place(&FREE, 10.0, 0.1, 104.0)) + 2.0).abs() < 1e-9);
+        assert!((log(place(&FREE, 10.0, 0.4, 104.0)) - 4.0_f64.ln() + 2.0).abs() < 1e-9);
+        // Samples of both places, which are far apart.
+        let counts = |log_likelihood: f64| {
+            let all = samples(&[(first(), 0.0), (place(&ALL, 10.0, 0.1, 90.0), log_likelihood)], 1.0);
+            let middle = sticking().shifted(Unknown::Offset, 5.0).get(Unknown::Offset);
+            let of_other = all.iter().filter(|sample| sample.get(Unknown::Offset) > middle).count();
+            [all.len() - of_other, of_other]
+        };
+        assert_eq!(counts(-2.0), [SAMPLES, (SAMPLES as f64 * (-2.0_f64).exp()) as usize]);
+        assert_eq!(counts(5.0), [SAMPLES, SAMPLES]);
+    }
+
+    #[test]
+    fn ends_within_a_deviation_are_one_place() {
+        let first = place(&[Unknown::Offset], 0.0, 0.1, 100.0);
+        for (offset, is_at) in [(0.09, true), (-0.09, true), (0.11, false)] {
+            assert_eq!(first.is_at(&sticking().shifted(Unknown::Offset, offset)), is_at, "{offset}");
+        }
     }
 
     #[test]

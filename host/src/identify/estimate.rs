@@ -124,6 +124,28 @@ impl AxisParametersFound {
     }
 }
 
+/// Drives that the recordings allow beside the one that was found: for intervals of what is made from all parameters together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Alternatives {
+    /// As likely as they are drawn; of a load inertia ratio of 0, as [`AxisParametersFound::drive`]. The scale of commands is
+    /// known better than all else and stays what was found.
+    pub drives: Vec<DriveParameters>,
+    /// What deviations are to be multiplied by: 1 where the model explains the recordings.
+    pub widening: f64,
+}
+
+impl Alternatives {
+    /// `value` with its interval, from what it is for each of the drives: 1.96 times the root of the mean square deviation.
+    #[must_use]
+    pub fn estimate(&self, value: f64, others: impl IntoIterator<Item = f64>) -> Estimate {
+        // What is infinite in both does not differ.
+        let deviation = |other: f64| if other.total_cmp(&value).is_eq() { 0.0 } else { other - value };
+        let squares: Vec<f64> = others.into_iter().map(|other| deviation(other).powi(2)).collect();
+        let deviation = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
+        Estimate { value, half_width_95: 1.96 * self.widening * deviation }
+    }
+}
+
 /// Figures read off the recordings without any model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figures {
@@ -165,6 +187,8 @@ pub struct RunMatch {
 pub struct Identification {
     /// The fitted model.
     pub parameters: AxisParametersFound,
+    /// Other drives that the recordings allow.
+    pub alternatives: Alternatives,
     /// The figures that need no model.
     pub figures: Figures,
     /// The residuals by run, in the order given.
@@ -222,6 +246,20 @@ impl Identification {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn intervals_span_the_alternatives() {
+        let drive = |velocity_gain_per_s| DriveParameters { velocity_gain_per_s, ..hal_sim::REFERENCE_X };
+        let alternatives = Alternatives { drives: vec![drive(439.0), drive(441.0)], widening: 3.0 };
+        let others = alternatives.drives.iter().map(|drive| 2.0 * drive.velocity_gain_per_s);
+        let twice = alternatives.estimate(880.0, others);
+        assert!(
+            (twice.half_width_95 - 3.0 * 1.96 * 2.0).abs() < 1e-12 && twice.value.total_cmp(&880.0).is_eq()
+        );
+        let infinite = |value: f64| alternatives.estimate(value, [f64::INFINITY; 2]).half_width_95;
+        assert!(infinite(f64::INFINITY).total_cmp(&0.0).is_eq());
+        assert!(infinite(5.0).is_infinite());
+    }
 
     #[test]
     fn determined_is_relative() {

@@ -5,52 +5,20 @@
 //! right one can be seen: a right model leaves the errors of the readings and nothing else.
 
 use super::bed::likely_beds;
-use super::cholesky::Symmetric;
-use super::confidence::{Confidence, confidence};
-use super::differences::Parabolas;
+use super::coarse::{coarse, sustained_accel_mm_s2};
+use super::confidence::{Confidence, UnprovenBed, confidence};
 use super::parameters::{ALL, Unknown, Unknowns, without_bed};
-use super::readings::{Precision, Runs, dot};
+use super::readings::{Precision, Runs};
 use super::recording::{AxisRecording, span};
 use super::search::{Differences, Effort, Found, LAST_EFFORT, is_met, least, search};
 use super::simulation::SUBSTEPS;
 use super::valleys::{EXCHANGED_EFFORT, NEAR, SETTLING_EFFORT, UNDECIDED, finished, settled};
-use super::{AxisParametersFound, BedEstimate, Estimate, IdentifyError, RunMatch};
-
-/// Starts of the grid: velocity gain \[1/s\], integral time \[s\], lag \[ticks\] ...
-const GAINS_PER_S: [f64; 6] = [18.0, 40.0, 90.0, 200.0, 450.0, 1000.0];
-const INTEGRAL_TIMES_S: [f64; 4] = [0.006, 0.02, 0.07, 0.25];
-const LAGS_TICKS: [f64; 5] = [1.0, 3.0, 6.0, 12.0, 30.0];
-/// ... current limit over the greatest acceleration, in which friction and bed may have helped ...
-const LIMITS: [f64; 2] = [0.85, 1.2];
-/// ... and Coulomb friction over it.
-const FRICTIONS: [f64; 2] = [0.01, 0.2];
+use super::{Alternatives, AxisParametersFound, BedEstimate, Estimate, IdentifyError, RunMatch};
 
 /// Current limits that are tried over the greatest acceleration before every stage: above what the model asks for a
 /// limit does nothing, and a search that has gone there does not come back.
 const TRIED_LIMITS: [f64; 11] = [0.6, 0.7, 0.8, 0.87, 0.93, 1.0, 1.07, 1.15, 1.3, 1.6, 3.0];
 
-/// Starts that are followed: on the steps, and of those on all runs.
-const FOLLOWED: usize = 6;
-const CONTINUED: usize = 2;
-
-/// Unknowns of the first stage.
-const COARSE: [Unknown; 7] = [
-    Unknown::Gain,
-    Unknown::Offset,
-    Unknown::VelocityGain,
-    Unknown::IntegralTime,
-    Unknown::Lag,
-    Unknown::AccelLimit,
-    Unknown::Coulomb,
-];
-
-const GRID: Precision = Precision { substeps: 3, slack: 1e-2 };
-const COARSE_EFFORT: Effort = Effort {
-    precision: Precision { substeps: 4, slack: 5e-3 },
-    jacobians: 8,
-    least_gain: 1.0,
-    differences: Differences::OneSided,
-};
 const ROUGH_EFFORT: Effort = Effort {
     precision: Precision { substeps: 5, slack: 2e-3 },
     jacobians: 12,
@@ -89,8 +57,8 @@ const OTHERS: usize = 2;
 /// ... of distinct frequencies: two are one if the logarithm of their ratio is below this.
 const SAME_FREQUENCY: f64 = 0.2;
 
-/// A bed must lower the misfit by what its three unknowns are worth by themselves, three logarithms of the number of
-/// readings (Schwarz), and by 12 more: chance gives two unknowns as much in one of e⁶ cases.
+/// A bed must lower the misfit by what its unknowns are worth by themselves, and by 12 more: chance gives two unknowns as much in
+/// one of e⁶ cases.
 const BED_GAIN: f64 = 12.0;
 
 /// Two searches for one minimum end this far apart: positions are stairs where the limit acts, if low ones.
@@ -104,6 +72,7 @@ const MISS_MAX: f64 = 0.05;
 
 pub(super) struct Fit {
     pub(super) parameters: AxisParametersFound,
+    pub(super) alternatives: Alternatives,
     pub(super) runs: Vec<RunMatch>,
     pub(super) misfit_per_reading: f64,
 }
@@ -129,12 +98,6 @@ struct Model {
 impl Model {
     fn with_bed(found: Found) -> Self {
         Self { found, free: &ALL, unproven: None }
-    }
-
-    fn rigid(found: Found, unproven: Option<&Found>) -> Self {
-        let is_heavy = |bed: &Unknowns| bed.get(Unknown::BedMassRatio) > LEAST_RATIO;
-        let unproven = unproven.map(|bed| bed.unknowns).filter(is_heavy);
-        Self { found, free: without_bed(), unproven }
     }
 
     fn has_bed(&self) -> bool {
@@ -187,12 +150,24 @@ impl Stages {
 
     /// The one that explains more; a bed has to explain enough.
     fn better(&self, one: Model, other: Model) -> Model {
-        let is_other = match (one.has_bed(), other.has_bed()) {
-            (false, true) => self.is_bed(&one.found, &other.found),
-            (true, false) => !self.is_bed(&other.found, &one.found),
-            _ => other.found.misfit() < one.found.misfit(),
+        match (one.has_bed(), other.has_bed()) {
+            (false, true) => self.with_or_without(one.found, Some(other.found)),
+            (true, false) => self.with_or_without(other.found, Some(one.found)),
+            _ => {
+                let is_other = other.found.misfit() < one.found.misfit();
+                let [better, worse] = if is_other { [other, one] } else { [one, other] };
+                Model { unproven: better.unproven.or(worse.unproven), ..better }
+            }
+        }
+    }
+
+    /// The bed if it is one; else the rigid model, beside which a bed that explains more is not proven.
+    fn with_or_without(&self, rigid: Found, bed: Option<Found>) -> Model {
+        let bed = match bed {
+            Some(bed) if self.is_bed(&rigid, &bed) => return Model::with_bed(bed),
+            bed => bed.filter(|bed| is_heavy(bed) && gain(&self.runs, &rigid, bed) > 0.0),
         };
-        if is_other { other } else { one }
+        Model { found: rigid, free: without_bed(), unproven: bed.map(|bed| bed.unknowns) }
     }
 
     /// The rigid model as it is found from a bed, where it is not far worse.
@@ -204,16 +179,9 @@ impl Stages {
         if is_near { search(&self.runs, near.unknowns, without_bed(), LAST_EFFORT) } else { None }
     }
 
-    /// By how much a bed lowers the misfit, for one of each reading.
-    fn gain(&self, rigid: &Found, bed: &Found) -> f64 {
-        let each = (bed.misfit() / self.readings()).max(1.0);
-        (rigid.misfit() - bed.misfit()) / each
-    }
-
     /// Whether the misfits tell a bed from chance.
     fn is_bed(&self, rigid: &Found, bed: &Found) -> bool {
-        let is_heavy = bed.unknowns.get(Unknown::BedMassRatio) > LEAST_RATIO;
-        is_heavy && self.gain(rigid, bed) > 3.0 * libm::log(self.readings()) + BED_GAIN
+        is_heavy(bed) && gain(&self.runs, rigid, bed) > bed_price(&self.runs) + BED_GAIN
     }
 
     /// Where the rigid model follows in the middle: a bed, if its remainder promises one.
@@ -230,11 +198,9 @@ impl Stages {
         // What is promised is linear; a search may find more.
         let promising = starts.into_iter().take(BEDS).filter(|(_, gain)| *gain > PROMISE);
         let found = promising.filter_map(|(start, _)| search(&self.runs, start, &ALL, LAST_EFFORT));
-        let bed = least(found.chain(known)).filter(|bed| self.gain(&rigid, bed) > PROMISE);
-        Some(match bed.and_then(|bed| finished(&self.runs, bed, &ALL)) {
-            Some(bed) if self.is_bed(&rigid, &bed) => Model::with_bed(bed),
-            bed => Model::rigid(rigid, bed.as_ref()),
-        })
+        let bed = least(found.chain(known)).filter(|bed| gain(&self.runs, &rigid, bed) > PROMISE);
+        let bed = bed.and_then(|bed| finished(&self.runs, bed, &ALL));
+        Some(self.with_or_without(rigid, bed))
     }
 
     /// Where it does not: beds first.
@@ -247,10 +213,7 @@ impl Stages {
         self.runs.regroup(&bed.unknowns, SUBSTEPS);
         let bed = self.last(bed.unknowns, &ALL)?;
         let beside = self.rigid_from(&bed);
-        if is_met(&self.runs, &bed)
-            && bed.unknowns.get(Unknown::BedMassRatio) > LEAST_RATIO
-            && beside.is_none()
-        {
+        if is_met(&self.runs, &bed) && is_heavy(&bed) && beside.is_none() {
             // The rigid model misses it by far, wherever it starts.
             return finished(&self.runs, bed, &ALL).map(Model::with_bed);
         }
@@ -273,8 +236,7 @@ impl Stages {
         if is_bed || is_near {
             bed = finished(&self.runs, bed, &ALL)?;
         }
-        let is_bed = self.is_bed(&rigid, &bed);
-        Some(if is_bed { Model::with_bed(bed) } else { Model::rigid(rigid, Some(&bed)) })
+        Some(self.with_or_without(rigid, Some(bed)))
     }
 
     /// Where nothing follows: beds of all frequencies, from the start.
@@ -311,6 +273,22 @@ impl Stages {
     }
 }
 
+/// Whether a bed moves the axis.
+fn is_heavy(bed: &Found) -> bool {
+    bed.unknowns.get(Unknown::BedMassRatio) > LEAST_RATIO
+}
+
+/// By how much a bed lowers the misfit, for one of each reading.
+fn gain(runs: &Runs, rigid: &Found, bed: &Found) -> f64 {
+    let each = (bed.misfit() / runs.readings()).max(1.0);
+    (rigid.misfit() - bed.misfit()) / each
+}
+
+/// The gain that a bed's three unknowns are worth by themselves: a logarithm of the number of readings each (Schwarz).
+fn bed_price(runs: &Runs) -> f64 {
+    (ALL.len() - without_bed().len()) as f64 * libm::log(runs.readings())
+}
+
 /// `start` with the current limit that fits best.
 fn limited(runs: &Runs, start: Unknowns, accel_mm_s2: f64, precision: Precision) -> Unknowns {
     let with = |part: f64| {
@@ -332,16 +310,22 @@ fn limited(runs: &Runs, start: Unknowns, accel_mm_s2: f64, precision: Precision)
 fn concluded(
     recordings: &[AxisRecording],
     mut runs: Runs,
-    &Model { ref found, free, unproven }: &Model,
+    model: &Model,
 ) -> Option<Result<Fit, IdentifyError>> {
-    runs.regroup(&found.unknowns, SUBSTEPS);
-    let mut found = settled(&runs, found, free)?;
+    let free = model.free;
+    runs.regroup(&model.found.unknowns, SUBSTEPS);
+    let mut found = settled(&runs, &model.found, free)?;
     let (misfit, readings) = (found.misfit(), runs.readings());
     let is_met = is_met(&runs, &found);
     if is_met {
         runs.rescale(&found.misfits);
         found = Found { rivals: found.rivals, ..search(&runs, found.unknowns, free, SETTLING_EFFORT)? };
     }
+    let unproven = model.unproven.and_then(|bed| search(&runs, bed, &ALL, SETTLING_EFFORT));
+    let unproven = unproven.map(|bed| UnprovenBed {
+        unknowns: bed.unknowns,
+        log_likelihood: 0.5 * (gain(&runs, &found, &bed) - bed_price(&runs)),
+    });
     if let Some(simpler) = without_filter(&runs, &found, free) {
         found = simpler;
     }
@@ -350,11 +334,11 @@ fn concluded(
         Err(error) => return Some(Err(error)),
     };
     let left = if is_met { 0.0 } else { misfit - readings };
-    let unproven = unproven.and_then(|bed| search(&runs, bed, &ALL, SETTLING_EFFORT));
     let confidence = confidence(&mut runs, &found, free, unproven.as_ref(), left)?;
     let tick_s = recordings[0].tick_s;
     Some(Ok(Fit {
         parameters: estimates(&confidence, &found, tick_s),
+        alternatives: confidence.alternatives(),
         runs: matches,
         misfit_per_reading: misfit / readings,
     }))
@@ -373,99 +357,6 @@ fn without_filter(runs: &Runs, found: &Found, free: &[Unknown]) -> Option<Found>
     let is_enough = simpler.misfit() < found.misfit() + libm::log(readings) + STAIRS;
     let rivals = || found.rivals.iter().copied().chain([found.unknowns]).collect();
     is_enough.then(|| Found { rivals: rivals(), ..simpler })
-}
-
-/// The first stage, on runs that are not harmonic if there are such: a grid, and searches from its best
-/// points. The likeliest first.
-fn coarse(recordings: &[AxisRecording], resolution_mm: f64) -> Result<Vec<Unknowns>, IdentifyError> {
-    let steps: Vec<AxisRecording> =
-        recordings.iter().filter(|run| run.harmonic_hz.is_none()).cloned().collect();
-    let chosen = if steps.is_empty() { recordings } else { &steps };
-    let runs = Runs::new(chosen, resolution_mm);
-    let (gain, drift_mm_s) = slope_and_drift(chosen);
-    let sustained_accel_mm_s2 = sustained_accel_mm_s2(chosen);
-    if gain < 0.0 {
-        return Err(IdentifyError::Reversed { slope: gain });
-    }
-    let mut first = Unknowns::zero(chosen[0].tick_s / f64::from(SUBSTEPS));
-    first.set(Unknown::Gain, gain.clamp(0.2, 5.0));
-    first.set(Unknown::Offset, drift_mm_s);
-    first.set(Unknown::Viscous, 0.05);
-    first.set(Unknown::BedFrequency, 10.0);
-    let mut starts = Vec::new();
-    for velocity_gain_per_s in GAINS_PER_S {
-        for integral_time_s in
-            INTEGRAL_TIMES_S.into_iter().filter(|time_s| time_s * velocity_gain_per_s > 0.5)
-        {
-            for lag_s in LAGS_TICKS.map(|ticks| ticks * chosen[0].tick_s) {
-                for (limit, friction) in
-                    LIMITS.into_iter().flat_map(|limit| FRICTIONS.map(|part| (limit, part)))
-                {
-                    let mut start = first;
-                    start.set(Unknown::AccelLimit, limit * sustained_accel_mm_s2);
-                    start.set(Unknown::Coulomb, friction * sustained_accel_mm_s2);
-                    start.set(Unknown::VelocityGain, velocity_gain_per_s);
-                    start.set(Unknown::IntegralTime, integral_time_s);
-                    start.set(Unknown::Lag, lag_s);
-                    start.set(Unknown::CurrentLag, (0.2 * lag_s).min(0.3 / velocity_gain_per_s));
-                    starts.push(start);
-                }
-            }
-        }
-    }
-    let results = runs.residuals(&starts, GRID.substeps);
-    let weights = runs.weights(GRID);
-    let mut judged: Vec<(f64, Unknowns)> = results
-        .into_iter()
-        .zip(starts)
-        .filter_map(|(residuals, start)| Some((weights.misfits(&residuals?).iter().sum(), start)))
-        .collect();
-    judged.sort_by(|a, b| a.0.total_cmp(&b.0));
-    // Neighbours of the best end where the best ends.
-    let mut followed: Vec<Unknowns> = Vec::new();
-    for (_, start) in judged {
-        let is_other = |unknown: Unknown, other: &Unknowns| start.get(unknown) != other.get(unknown);
-        let is_new = followed
-            .iter()
-            .all(|other| is_other(Unknown::VelocityGain, other) || is_other(Unknown::IntegralTime, other));
-        if is_new {
-            followed.push(start);
-        }
-        if followed.len() == FOLLOWED {
-            break;
-        }
-    }
-    let mut found: Vec<Found> =
-        followed.into_iter().filter_map(|start| search(&runs, start, &COARSE, COARSE_EFFORT)).collect();
-    found.sort_by(|a, b| a.misfit().total_cmp(&b.misfit()));
-    Ok(found.into_iter().take(CONTINUED).map(|found| found.unknowns).collect())
-}
-
-/// How an axis without any lag would fit best: by its gain, and its velocity at command 0 \[mm/s\].
-///
-/// A run without a lag is off by a lag's travel in every one of its motions, and back after it.
-fn slope_and_drift(recordings: &[AxisRecording]) -> (f64, f64) {
-    let mut normal = Symmetric::zero(2);
-    let mut right = [0.0; 2];
-    for run in recordings {
-        let times_s: Vec<f64> = (0..run.actual_mm.len()).map(|tick| tick as f64 * run.tick_s).collect();
-        let centred = |values: &[f64]| {
-            let mean = values.iter().sum::<f64>() / values.len() as f64;
-            values.iter().map(|value| value - mean).collect::<Vec<f64>>()
-        };
-        let columns = [centred(&run.commanded_mm()), centred(&times_s)];
-        let actual = centred(&run.actual_mm);
-        for (row, column) in columns.iter().enumerate() {
-            right[row] += dot(column, &actual);
-            for (other, values) in columns.iter().enumerate() {
-                *normal.at_mut(row, other) += dot(column, values);
-            }
-        }
-    }
-    match normal.solve(&right).as_deref() {
-        Some(&[gain, drift_mm_s]) => (gain, drift_mm_s),
-        _ => (1.0, 0.0),
-    }
 }
 
 fn matches(runs: &Runs, recordings: &[AxisRecording], found: &Found) -> Result<Vec<RunMatch>, IdentifyError> {
@@ -513,13 +404,4 @@ fn estimates(confidence: &Confidence, found: &Found, tick_s: f64) -> AxisParamet
         load_inertia_ratio: Estimate { value: 0.0, half_width_95: f64::INFINITY },
         bed,
     }
-}
-
-/// The greatest acceleration that lasted for 5 ms in any run \[mm/s²\].
-pub(super) fn sustained_accel_mm_s2(recordings: &[AxisRecording]) -> f64 {
-    let of_run = |run: &AxisRecording| {
-        let parabolas = Parabolas::over(5e-3, run.tick_s);
-        parabolas.of(&run.actual_mm).map(|(_, _, accel)| accel.abs()).fold(0.0, f64::max)
-    };
-    recordings.iter().map(of_run).fold(0.0, f64::max)
 }

@@ -62,6 +62,7 @@ mod cholesky;
 mod moments;
 mod readings;
 mod search;
+mod coarse;
 mod bed;
 mod confidence;
 mod valleys;
@@ -75,7 +76,7 @@ mod fixtures;
 pub use display::Described;
 pub use error::IdentifyError;
 pub use estimate::{
-    AxisParametersFound, BedEstimate, DETERMINED, Estimate, Figures, Identification, RunMatch,
+    Alternatives, AxisParametersFound, BedEstimate, DETERMINED, Estimate, Figures, Identification, RunMatch,
 };
 pub use excitation::{Excitation, Reach, explore, first_look, identification_plan};
 pub use harmonic_reading::{Bandwidth, HarmonicReading};
@@ -95,6 +96,7 @@ pub fn identify(runs: &[AxisRecording]) -> Result<Identification, IdentifyError>
     let fit = fit::fit(runs, figures.resolution_mm)?;
     Ok(Identification {
         parameters: fit.parameters,
+        alternatives: fit.alternatives,
         figures,
         runs: fit.runs,
         misfit_per_reading: fit.misfit_per_reading,
@@ -119,6 +121,6 @@ pub fn figures(runs: &[AxisRecording]) -> Result<Figures, IdentifyError> {
         steps: runs.iter().flat_map(|run| step_reading::step_reading(run, resolution_mm)).collect(),
         bandwidths: harmonic_reading::bandwidths(&harmonics),
         harmonics,
-        sustained_accel_mm_s2: fit::sustained_accel_mm_s2(runs),
+        sustained_accel_mm_s2: coarse::sustained_accel_mm_s2(runs),
     })
 }

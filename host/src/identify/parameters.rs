@@ -10,8 +10,12 @@
 //! the current loop. In these every model is nearly a plane. In dead time and lags it is not: steps a hundredth too
 //! long or short are all that remains of a search that goes astray in them.
 
-#[cfg(test)]
 use hal_sim::{BedMode, DriveParameters};
+
+/// From one place to another, in the coordinates of the `free` unknowns.
+pub(super) fn way(free: &[Unknown], from: &Unknowns, to: &Unknowns) -> Vec<f64> {
+    free.iter().map(|unknown| unknown.distance(from, to)).collect()
+}
 
 /// Number of unknowns.
 pub(super) const COUNT: usize = 13;
@@ -325,7 +329,6 @@ impl Unknowns {
     }
 
     /// The drive with these values; on a rigid bed if the mass ratio is 0.
-    #[cfg(test)]
     pub(super) fn drive(&self) -> DriveParameters {
         let mass_ratio = self.get(BedMassRatio);
         DriveParameters {

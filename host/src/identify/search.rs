@@ -99,9 +99,11 @@ pub(super) fn derivatives(
     let pair = |unknown: Unknown| {
         let step = unknown.difference();
         let [up, down] = [step, -step].map(|step| neighbour(unknown, step));
+        let off = |other: &Unknowns| unknown.distance(unknowns, other).abs();
         match is_central {
             true => [up, down],
-            false if up == *unknowns => [down, up],
+            // A bound may be near.
+            false if off(&down) > 2.0 * off(&up) => [down, *unknowns],
             false => [up, *unknowns],
         }
     };
@@ -173,7 +175,7 @@ pub(super) fn search(runs: &Runs, start: Unknowns, free: &[Unknown], effort: Eff
         let least_gain = least_gain.max(LEAST_PART * (best.misfit() - readings));
         found = Some(best);
         if differences == Differences::CentralAtEnd && !is_central {
-            is_central = !(gain > NEAR_GAIN);
+            is_central = !(gain > NEAR_GAIN.max(least_gain));
         } else if !(gain > least_gain) {
             break;
         }

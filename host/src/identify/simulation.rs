@@ -166,6 +166,7 @@ impl Model {
         let is_moment = is_frozen != state.is_frozen;
         state.is_frozen = is_frozen;
         state.demand = demand;
+        // Loops, as closures over lanes are not inlined everywhere.
         let mut limited = demand;
         for (limited, limit) in limited.iter_mut().zip(&self.limit) {
             *limited = limited.min(*limit).max(-limit);

@@ -5,8 +5,8 @@
 //! way. What leads back to a valley that is known is left early.
 
 use super::cholesky::Symmetric;
-use super::confidence::{distance2, floor};
-use super::parameters::{Unknown, Unknowns};
+use super::confidence::floor;
+use super::parameters::{Unknown, Unknowns, way};
 use super::readings::{Precision, Runs};
 use super::search::{Differences, Effort, Found, LAST_EFFORT, derivatives, is_met, search};
 use super::simulation::SUBSTEPS;
@@ -120,7 +120,7 @@ impl Valley {
 
     /// By how much a place is worse than the end, if the floor is a parabola.
     fn rise(&self, to: &Unknowns, free: &[Unknown]) -> f64 {
-        distance2(&self.information, free, &self.end.unknowns, to)
+        self.information.quadratic_form(&way(free, &self.end.unknowns, to))
     }
 
     /// Whether a place may lie in the valley: it is no lower there than the parabola tells. It is higher where a search is

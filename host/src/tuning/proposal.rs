@@ -39,8 +39,12 @@ pub struct AxisTuning {
     pub feedforward: Feedforward,
     /// New trim of the output \[V\].
     pub output_offset_v: f64,
-    /// Margins of the new loop, in the identified model.
+    /// Margins of the new loop, in the identified model ...
     pub margins: Margins,
+    /// ... and how well the recordings tell its phase margin \[°\] ...
+    pub phase_margin_deg: Estimate,
+    /// ... and its gain margin. Infinite if there is none.
+    pub gain_margin: Estimate,
     /// Every value that is set, changed or not, in the order of the file.
     pub changes: Vec<Change>,
     /// Remarks for the technician: what was not determined, what else the axis' settings should respect.
@@ -69,11 +73,17 @@ pub fn propose(
     let best = best(looped, tick_s, kd_max).ok_or_else(|| TuningError::Lag { axis: axis.name.clone() })?;
     let gains = written(scaled(best, 1.0 / gain));
     let loop_gains = scaled(gains, gain);
+    let margins = Margins::of(looped, loop_gains, tick_s);
+    let drives = found.alternatives.drives.iter();
+    let others: Vec<Margins> = drives.map(|drive| Margins::of(drive, loop_gains, tick_s)).collect();
+    let estimate = |of: fn(&Margins) -> f64| found.alternatives.estimate(of(&margins), others.iter().map(of));
     let mut tuning = AxisTuning {
         gains,
         feedforward: feedforward(method, drive, gain, &loop_gains, tick_s),
         output_offset_v: offset_v(axis, parameters),
-        margins: Margins::of(looped, loop_gains, tick_s),
+        margins,
+        phase_margin_deg: estimate(|margins| margins.phase_deg),
+        gain_margin: estimate(|margins| margins.gain),
         changes: Vec::new(),
         remarks: remarks(axis, found),
     };
@@ -222,8 +232,14 @@ fn changes(
             "1/s",
             format!(
                 "with kd it leaves least of disturbances, with {PHASE_MIN_DEG}° of phase and a factor {GAIN_MIN} of gain in \
-                 hand: crossover {:.1} Hz, phase margin {:.1}°, gain margin {:.2}, errors magnified at most {:.2} times",
-                margins.crossover_hz, margins.phase_deg, margins.gain, margins.sensitivity
+                 hand: crossover {:.1} Hz, phase margin {:.2} ± {:.2}°, gain margin {:.3} ± {:.3}, errors magnified at most \
+                 {:.2} times",
+                margins.crossover_hz,
+                margins.phase_deg,
+                tuning.phase_margin_deg.half_width_95,
+                margins.gain,
+                tuning.gain_margin.half_width_95,
+                margins.sensitivity
             ),
         ),
         change(

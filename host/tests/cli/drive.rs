@@ -286,7 +286,12 @@ fn drive_tune_writes_what_it_has_verified() {
     assert_eq!(axes.len(), 2);
     for axis in axes {
         assert_has(axis, &["changes", "found", "margins", "name", "remarks"]);
-        assert_has(&axis["margins"], &["crossover_hz", "gain", "phase_deg", "sensitivity"]);
+        let margins = &axis["margins"];
+        assert_has(margins, &["crossover_hz", "gain", "half_widths_95", "phase_deg", "sensitivity"]);
+        for key in ["phase_deg", "gain"] {
+            let part = number(&margins["half_widths_95"][key]) / number(&margins[key]);
+            assert!((1e-6..0.02).contains(&part), "{key}: {margins}");
+        }
         assert!((number(&axis["found"]["velocity_gain_per_s"]["value"]) - 440.0).abs() < 4.4);
         for change in axis["changes"].as_array().expect("a list") {
             assert_has(change, &["after", "before", "key", "reason", "unit"]);

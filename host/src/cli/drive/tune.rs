@@ -48,7 +48,7 @@ Examples:
   motion drive tune --axis X --method fit --json     V, A and J gains only, for a script
 
 JSON: axes: list of {name, found: {velocity_gain_per_s…: {value, half_width_95, determined}}, margins: {crossover_hz, phase_deg, gain,
-sensitivity}, changes: list of {key, before, after, unit, reason}, remarks}, verification: {feed_mm_min, circles: list of
+sensitivity, half_widths_95: {phase_deg, gain}}, changes: list of {key, before, after, unit, reason}, remarks}, verification: {feed_mm_min, circles: list of
 {axes, frequency_hz, feed_mm_min, before, after: {contour_error_um, form_deviation_um, following_error_first_um,
 following_error_second_um}}, not_driven: list of {axes, frequency_hz, feed_mm_min, reason}}, learning: null, or {repeats: list of {contour_error_um, following_error_um_rms of the three
 axes}, best_repeat, ended, robustness: list of {axis, filter_corner_hz, contraction, contraction_hz}, reason (null if a
@@ -650,6 +650,14 @@ struct MarginsJson {
     phase_deg: f64,
     gain: Option<f64>,
     sensitivity: f64,
+    half_widths_95: MarginWidthsJson,
+}
+
+/// Null where it is unbounded.
+#[derive(Serialize)]
+struct MarginWidthsJson {
+    phase_deg: Option<f64>,
+    gain: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -710,6 +718,7 @@ fn learning_json<'run>(machine: &'run Machine, learnt: &Result<Learnt, DriveErro
 
 fn axis_json<'run>(name: &'run str, Tuned { found, tuning, .. }: &'run Tuned) -> AxisJson<'run> {
     let margins = &tuning.margins;
+    let width = |estimate: Estimate| Some(estimate.half_width_95).filter(|width| width.is_finite());
     AxisJson {
         name,
         found: FoundJson::of(found),
@@ -718,6 +727,10 @@ fn axis_json<'run>(name: &'run str, Tuned { found, tuning, .. }: &'run Tuned) ->
             phase_deg: margins.phase_deg,
             gain: Some(margins.gain).filter(|gain| gain.is_finite()),
             sensitivity: margins.sensitivity,
+            half_widths_95: MarginWidthsJson {
+                phase_deg: width(tuning.phase_margin_deg),
+                gain: width(tuning.gain_margin),
+            },
         },
         changes: tuning
             .changes

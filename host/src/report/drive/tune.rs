@@ -12,7 +12,7 @@ use super::circle::{Around, CIRCLE_LIMIT_UM, around, circle_around};
 use super::{db, over_frequency};
 use crate::drive::circle::CircleFigures;
 use crate::drive::model;
-use crate::identify::{Described, HarmonicReading, Identification};
+use crate::identify::{Described, Estimate, HarmonicReading, Identification};
 use crate::machine::{AxisSettings, Machine};
 use crate::tuning::AxisTuning;
 use crate::tuning::gains::scaled;
@@ -159,22 +159,29 @@ fn of_axis(machine: &Machine, of: &TunedAxis<'_>, findings: &mut Findings) {
         findings.notes(tuning.remarks.iter().map(String::as_str));
         let margins = &tuning.margins;
         let rows = [
-            ("phase margin", figure(margins.phase_deg, 4), "°"),
-            ("gain margin", gain_margin(margins.gain), ""),
+            ("phase margin", within(tuning.phase_margin_deg), "°"),
+            ("gain margin", gain_margin(tuning.gain_margin), ""),
             ("delay margin", figure(margins.delay_s() * 1e3, 4), "ms"),
             ("crossover", figure(margins.crossover_hz, 4), "Hz"),
             ("greatest magnification of an error", figure(margins.sensitivity, 4), ""),
         ];
         let rows = rows.into_iter();
         let rows = rows.map(|(name, value, unit)| vec![name.to_owned(), value, unit.to_owned()]);
-        findings.words("Margins of the position loop.");
+        findings.words(
+            "Margins of the position loop, and within what the recordings tell them in 95 of 100 cases.",
+        );
         findings.table("Margins", &["*Margin", "Value", "*Unit"], rows);
     }
     findings.figures(of_drive(machine, of).into_iter().map(Figure::from));
 }
 
-fn gain_margin(gain: f64) -> String {
-    if gain.is_finite() { figure(gain, 4) } else { "none: it may grow at will".to_owned() }
+fn within(Estimate { value, half_width_95 }: Estimate) -> String {
+    let width = if half_width_95.is_finite() { figure(half_width_95, 2) } else { "any".to_owned() };
+    format!("{} ± {width}", figure(value, 4))
+}
+
+fn gain_margin(gain: Estimate) -> String {
+    if gain.value.is_finite() { within(gain) } else { "none: it may grow at will".to_owned() }
 }
 
 /// Frequencies in equal ratios.
