@@ -40,7 +40,7 @@ const KICKED_EFFORT: Effort =
 const KICK_GAIN: f64 = 0.5;
 /// The same where the model does not follow: the floor is curved there, and a search stops far from its end.
 const FAR_KICKS: [f64; 6] = [-100.0, -30.0, -9.0, 9.0, 30.0, 100.0];
-const FAR_EFFORT: Effort = Effort { jacobians: 6, differences: Differences::OneSided, ..KICKED_EFFORT };
+const FAR_EFFORT: Effort = Effort { jacobians: 6, ..KICKED_EFFORT };
 /// Most kicks after each other.
 const KICKED_ROUNDS: usize = 4;
 
