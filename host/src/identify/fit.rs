@@ -150,15 +150,14 @@ impl Stages {
 
     /// The one that explains more; a bed has to explain enough.
     fn better(&self, one: Model, other: Model) -> Model {
-        match (one.has_bed(), other.has_bed()) {
+        let known = one.unproven.or(other.unproven);
+        let better = match (one.has_bed(), other.has_bed()) {
             (false, true) => self.with_or_without(one.found, Some(other.found)),
             (true, false) => self.with_or_without(other.found, Some(one.found)),
-            _ => {
-                let is_other = other.found.misfit() < one.found.misfit();
-                let [better, worse] = if is_other { [other, one] } else { [one, other] };
-                Model { unproven: better.unproven.or(worse.unproven), ..better }
-            }
-        }
+            _ if other.found.misfit() < one.found.misfit() => other,
+            _ => one,
+        };
+        if better.has_bed() { better } else { Model { unproven: better.unproven.or(known), ..better } }
     }
 
     /// The bed if it is one; else the rigid model, beside which a bed that explains more is not proven.
@@ -403,5 +402,64 @@ fn estimates(confidence: &Confidence, found: &Found, tick_s: f64) -> AxisParamet
         viscous_friction_per_s: of(Unknown::Viscous),
         load_inertia_ratio: Estimate { value: 0.0, half_width_95: f64::INFINITY },
         bed,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixtures::{recorded, sticking};
+    use super::*;
+
+    const RESOLUTION_MM: f64 = 1e-3;
+
+    fn stages() -> Stages {
+        let run = recorded(&sticking(), vec![0.0; 4000], RESOLUTION_MM);
+        Stages { runs: Runs::new(&[run], RESOLUTION_MM), accel_mm_s2: 1.0 }
+    }
+
+    fn found(mass_ratio: f64, misfit: f64) -> Found {
+        let mut unknowns = sticking();
+        unknowns.set(Unknown::BedMassRatio, mass_ratio);
+        Found { unknowns, residuals: Vec::new(), misfits: vec![misfit], rivals: Vec::new() }
+    }
+
+    /// Three logarithms of 4000 readings are 25, and 12 more are asked for.
+    #[test]
+    fn a_bed_that_gains_too_little_is_not_proven() {
+        let stages = stages();
+        assert!((bed_price(&stages.runs) - 24.88).abs() < 0.01);
+        for (mass_ratio, gain, is_bed, is_unproven) in [
+            (0.05, 38.0, true, false),
+            (0.05, 36.0, false, true),
+            (0.05, 1.0, false, true),
+            (0.05, -1.0, false, false),
+            (1e-3, 38.0, false, false),
+        ] {
+            let model = stages.with_or_without(found(0.0, 3900.0), Some(found(mass_ratio, 3900.0 - gain)));
+            assert_eq!((model.has_bed(), model.unproven.is_some()), (is_bed, is_unproven), "{gain}");
+        }
+    }
+
+    /// Whichever of two rigid models is better, and whichever came first.
+    #[test]
+    fn a_bed_that_is_not_proven_stays_beside_another_model() {
+        let stages = stages();
+        let bed = || Model::with_bed(found(0.05, 3890.0));
+        let rigid = |misfit: f64, bed: Option<f64>| Model {
+            found: found(0.0, misfit),
+            free: without_bed(),
+            unproven: bed.map(|mass_ratio| found(mass_ratio, 0.0).unknowns),
+        };
+        for model in [
+            stages.better(bed(), rigid(3900.0, None)),
+            stages.better(rigid(3900.0, None), bed()),
+            stages.better(rigid(3900.0, None), rigid(3910.0, Some(0.05))),
+            stages.better(rigid(3910.0, Some(0.05)), rigid(3900.0, Some(0.1))),
+        ] {
+            assert!(!model.has_bed() && model.unproven.is_some());
+            assert!((model.found.misfit() - 3900.0).abs() < 1e-9);
+        }
+        let proven = stages.better(rigid(3900.0, Some(0.1)), Model::with_bed(found(0.05, 3800.0)));
+        assert!(proven.has_bed() && proven.unproven.is_none());
     }
 }

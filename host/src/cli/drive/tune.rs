@@ -47,13 +47,14 @@ Examples:
   motion drive tune --method series --learn 5        and the gain by learning from repeats
   motion drive tune --axis X --method fit --json     V, A and J gains only, for a script
 
-JSON: axes: list of {name, found: {velocity_gain_per_s…: {value, half_width_95, determined}}, margins: {crossover_hz, phase_deg, gain,
-sensitivity, half_widths_95: {phase_deg, gain}}, changes: list of {key, before, after, unit, reason}, remarks}, verification: {feed_mm_min, circles: list of
-{axes, frequency_hz, feed_mm_min, before, after: {contour_error_um, form_deviation_um, following_error_first_um,
-following_error_second_um}}, not_driven: list of {axes, frequency_hz, feed_mm_min, reason}}, learning: null, or {repeats: list of {contour_error_um, following_error_um_rms of the three
-axes}, best_repeat, ended, robustness: list of {axis, filter_corner_hz, contraction, contraction_hz}, reason (null if a
-correction was learnt; else why not: then without repeats where it could not begin)}, output, reason (null if the machine
-file was written; else why not, also where nothing could be tuned).
+JSON: axes: list of {name, found: {velocity_gain_per_s…: {value, half_width_95, determined}}, margins: {crossover_hz,
+phase_deg, gain, sensitivity, half_widths_95: {phase_deg, gain}}, changes: list of {key, before, after, unit, reason},
+remarks}, verification: {feed_mm_min, circles: list of {axes, frequency_hz, feed_mm_min, before, after:
+{contour_error_um, form_deviation_um, following_error_first_um, following_error_second_um}}, not_driven: list of {axes,
+frequency_hz, feed_mm_min, reason}}, learning: null, or {repeats: list of {contour_error_um, following_error_um_rms of
+the three axes}, best_repeat, ended, robustness: list of {axis, filter_corner_hz, contraction, contraction_hz}, reason
+(null if a correction was learnt; else why not: then without repeats where it could not begin)}, output, reason (null
+if the machine file was written; else why not, also where nothing could be tuned).
 
 Circles stay within what the outputs reach and the current limit that was found bears: a circle that is driven slower
 than the others, or not at all, is in not_driven.
@@ -653,7 +654,7 @@ struct MarginsJson {
     half_widths_95: MarginWidthsJson,
 }
 
-/// Null where it is unbounded.
+/// Null where it is unbounded, or there is no margin.
 #[derive(Serialize)]
 struct MarginWidthsJson {
     phase_deg: Option<f64>,
@@ -718,7 +719,9 @@ fn learning_json<'run>(machine: &'run Machine, learnt: &Result<Learnt, DriveErro
 
 fn axis_json<'run>(name: &'run str, Tuned { found, tuning, .. }: &'run Tuned) -> AxisJson<'run> {
     let margins = &tuning.margins;
-    let width = |estimate: Estimate| Some(estimate.half_width_95).filter(|width| width.is_finite());
+    let width = |Estimate { value, half_width_95 }: Estimate| {
+        (value.is_finite() && half_width_95.is_finite()).then_some(half_width_95)
+    };
     AxisJson {
         name,
         found: FoundJson::of(found),
