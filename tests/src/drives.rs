@@ -30,10 +30,8 @@ const FASTEST_MM_S: f64 = 10.0 * REFERENCE_MM_S_PER_VOLT;
 pub const HALF_WIDTHS_MAX: f64 = 4.0;
 /// The mass ratio up to which a bed may be missed: it moves the axis by less than recordings tell.
 pub const MISSED_RATIO_MAX: f64 = 0.035;
-/// What margins may be off by, as a part of the true ones ...
+/// What margins may be off by, as a part of the true ones.
 pub const MARGINS_OFF_MAX: f64 = 0.02;
-/// ... and where their intervals say that the recordings do not tell them as well: half-widths.
-pub const MARGINS_HALF_WIDTHS_MAX: f64 = 2.0;
 
 /// An axis that was drawn.
 #[derive(Clone, Copy, Debug)]
@@ -242,12 +240,11 @@ impl Surveyed {
                 _ => {}
             }
         }
-        let bed = self.axis.drive.bed.map_or_else(String::new, |bed| format!(", {}", bed_words(bed)));
-        let margins = self.margins.iter().flatten();
-        let margins = margins.filter(|one| {
-            !(one.part_off() <= MARGINS_OFF_MAX) && !(one.half_widths_off() <= MARGINS_HALF_WIDTHS_MAX)
-        });
-        wrong.extend(margins.map(|one| format!("{}{bed}", one.words())));
+        let margins = self.margins.iter().flatten().filter(|one| !(one.part_off() <= MARGINS_OFF_MAX));
+        wrong.extend(margins.map(|one| {
+            let bed = self.axis.drive.bed.map_or_else(String::new, |bed| format!(", {}", bed_words(bed)));
+            format!("{} ({:.1} %){bed}", one.words(), 100.0 * one.part_off())
+        }));
         wrong.extend(self.circles.worse.iter().cloned());
         wrong
     }

@@ -6,7 +6,7 @@ use super::differences::Parabolas;
 use super::parameters::{Unknown, Unknowns};
 use super::readings::{Precision, Runs, dot};
 use super::recording::AxisRecording;
-use super::search::{Differences, Effort, Found, search};
+use super::search::{Effort, Found, search};
 use super::simulation::SUBSTEPS;
 
 /// Starts of the grid: velocity gain \[1/s\], integral time \[s\], lag \[ticks\] ...
@@ -34,12 +34,7 @@ const COARSE: [Unknown; 7] = [
 ];
 
 const GRID: Precision = Precision { substeps: 3, slack: 1e-2 };
-const COARSE_EFFORT: Effort = Effort {
-    precision: Precision { substeps: 4, slack: 5e-3 },
-    jacobians: 8,
-    least_gain: 1.0,
-    differences: Differences::OneSided,
-};
+const COARSE_EFFORT: Effort = Effort::far(Precision { substeps: 4, slack: 5e-3 }, 8);
 
 /// The first stage, on runs that are not harmonic if there are such: a grid, and searches from its best
 /// points. The likeliest first.
@@ -139,9 +134,6 @@ fn slope_and_drift(recordings: &[AxisRecording]) -> (f64, f64) {
 
 /// The greatest acceleration that lasted for 5 ms in any run \[mm/s²\].
 pub(super) fn sustained_accel_mm_s2(recordings: &[AxisRecording]) -> f64 {
-    let of_run = |run: &AxisRecording| {
-        let parabolas = Parabolas::over(5e-3, run.tick_s);
-        parabolas.of(&run.actual_mm).map(|(_, _, accel)| accel.abs()).fold(0.0, f64::max)
-    };
+    let of_run = |run: &AxisRecording| Parabolas::over(5e-3, run.tick_s).greatest_accel(&run.actual_mm);
     recordings.iter().map(of_run).fold(0.0, f64::max)
 }

@@ -357,7 +357,7 @@ impl Confidence {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fixtures::{TICK_S, recorded, sticking};
+    use super::super::fixtures::{harmonic, sticking};
     use super::super::parameters::without_bed;
     use super::*;
 
@@ -409,14 +409,9 @@ mod tests {
         assert!((SCATTER_MIN.sqrt() - 1e-9..0.8).contains(&part), "{part}");
     }
 
-    /// An axis on a bed that moves by part of a count from tick to tick, and what it is.
+    /// A quiet axis, and what it is.
     fn quiet() -> (Runs, Found) {
-        const RESOLUTION_MM: f64 = 1e-3;
-        let unknowns = sticking();
-        let feed = |tick: usize| 40.0 * libm::sin(core::f64::consts::TAU * 3.0 * TICK_S * tick as f64);
-        let run = recorded(&unknowns, (0..4000).map(feed).collect(), RESOLUTION_MM);
-        let mut runs = Runs::new(&[run], RESOLUTION_MM);
-        runs.regroup(&unknowns, SUBSTEPS);
+        let (runs, unknowns) = (harmonic(), sticking());
         let residuals = runs.residuals(&[unknowns], SUBSTEPS).remove(0).expect("numbers");
         let misfits = runs.weights(Precision::LAST).misfits(&residuals);
         (runs, Found { unknowns, residuals, misfits, rivals: Vec::new() })

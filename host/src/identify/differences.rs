@@ -46,6 +46,11 @@ impl Parabolas {
         rounding(resolution_mm) / self.moments().0.sqrt() / self.tick_s
     }
 
+    /// The greatest acceleration in either direction \[mm/s²\]; 0 for too few readings.
+    pub(super) fn greatest_accel(&self, positions: &[f64]) -> f64 {
+        self.of(positions).map(|(_, _, accel)| accel.abs()).fold(0.0, f64::max)
+    }
+
     /// Velocity and acceleration at every tick that has enough readings on both sides, as (tick, mm/s,
     /// mm/s²).
     pub(super) fn of<'a>(&self, positions: &'a [f64]) -> impl Iterator<Item = (usize, f64, f64)> + use<'a> {

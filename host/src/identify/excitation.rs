@@ -123,14 +123,11 @@ pub fn explore<E>(
 /// The greatest acceleration of a run \[mm/s²\], over a time in which the encoder shows it.
 fn accel_mm_s2(run: &AxisRecording) -> f64 {
     let begins = run.command_mm_s.iter().position(|command| *command != run.rest_mm_s()).unwrap_or(0);
-    let most = |parabolas: Parabolas, positions: &[f64]| {
-        parabolas.of(positions).map(|(_, _, accel)| accel.abs()).fold(0.0, f64::max)
-    };
     let mut found = 0.0;
     for time_s in [5e-3, 10e-3, 20e-3, 40e-3] {
         let parabolas = Parabolas::over(time_s, run.tick_s);
-        found = most(parabolas, &run.actual_mm);
-        if most(parabolas, &run.actual_mm[..begins]) < 0.1 * found {
+        found = parabolas.greatest_accel(&run.actual_mm);
+        if parabolas.greatest_accel(&run.actual_mm[..begins]) < 0.1 * found {
             break;
         }
     }

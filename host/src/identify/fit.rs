@@ -10,7 +10,7 @@ use super::confidence::{Confidence, UnprovenBed, confidence};
 use super::parameters::{ALL, Unknown, Unknowns, without_bed};
 use super::readings::{Precision, Runs};
 use super::recording::{AxisRecording, span};
-use super::search::{Differences, Effort, Found, LAST_EFFORT, is_met, least, search};
+use super::search::{Effort, Found, LAST_EFFORT, is_met, least, search};
 use super::simulation::SUBSTEPS;
 use super::valleys::{EXCHANGED_EFFORT, NEAR, SETTLING_EFFORT, UNDECIDED, finished, settled};
 use super::{Alternatives, AxisParametersFound, BedEstimate, Estimate, IdentifyError, RunMatch};
@@ -19,26 +19,11 @@ use super::{Alternatives, AxisParametersFound, BedEstimate, Estimate, IdentifyEr
 /// limit does nothing, and a search that has gone there does not come back.
 const TRIED_LIMITS: [f64; 11] = [0.6, 0.7, 0.8, 0.87, 0.93, 1.0, 1.07, 1.15, 1.3, 1.6, 3.0];
 
-const ROUGH_EFFORT: Effort = Effort {
-    precision: Precision { substeps: 5, slack: 2e-3 },
-    jacobians: 12,
-    least_gain: 1.0,
-    differences: Differences::OneSided,
-};
-const MIDDLE_EFFORT: Effort = Effort {
-    precision: Precision { substeps: 10, slack: 2e-4 },
-    jacobians: 12,
-    least_gain: 1.0,
-    differences: Differences::OneSided,
-};
+const ROUGH_EFFORT: Effort = Effort::far(Precision { substeps: 5, slack: 2e-3 }, 12);
+const MIDDLE_EFFORT: Effort = Effort::far(Precision { substeps: 10, slack: 2e-4 }, 12);
 /// Of each of several beds, before the best of them is followed.
 const BEGUN_EFFORT: Effort = Effort { jacobians: 4, ..MIDDLE_EFFORT };
-const FINE_EFFORT: Effort = Effort {
-    precision: Precision { substeps: SUBSTEPS, slack: 5e-5 },
-    jacobians: 6,
-    least_gain: 1.0,
-    differences: Differences::OneSided,
-};
+const FINE_EFFORT: Effort = Effort::far(Precision { substeps: SUBSTEPS, slack: 5e-5 }, 6);
 
 /// Beds that are followed.
 const BEDS: usize = 3;

@@ -3,6 +3,7 @@
 use hal_sim::{DriveModel, DriveState};
 
 use super::parameters::{Unknown, Unknowns};
+use super::readings::Runs;
 use super::recording::AxisRecording;
 use super::simulation::SUBSTEPS;
 
@@ -36,6 +37,16 @@ pub(super) fn sticking() -> Unknowns {
         (Unknown::BedMassRatio, 0.133),
     ];
     unknowns(values, [4.843e-5, 1.082e-4, 1.229e-4])
+}
+
+/// That drive in harmonic motion, of which an encoder of 1 µm reads some counts in every tick.
+pub(super) fn harmonic() -> Runs {
+    const RESOLUTION_MM: f64 = 1e-3;
+    let feed = |tick: usize| 40.0 * libm::sin(core::f64::consts::TAU * 3.0 * TICK_S * tick as f64);
+    let run = recorded(&sticking(), (0..4000).map(feed).collect(), RESOLUTION_MM);
+    let mut runs = Runs::new(&[run], RESOLUTION_MM);
+    runs.regroup(&sticking(), SUBSTEPS);
+    runs
 }
 
 /// What an encoder of `resolution_mm` reads of the simulated drive.

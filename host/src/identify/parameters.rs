@@ -12,11 +12,6 @@
 
 use hal_sim::{BedMode, DriveParameters};
 
-/// From one place to another, in the coordinates of the `free` unknowns.
-pub(super) fn way(free: &[Unknown], from: &Unknowns, to: &Unknowns) -> Vec<f64> {
-    free.iter().map(|unknown| unknown.distance(from, to)).collect()
-}
-
 /// Number of unknowns.
 pub(super) const COUNT: usize = 13;
 
@@ -348,4 +343,9 @@ impl Unknowns {
             }),
         }
     }
+}
+
+/// From one place to another, in the coordinates of the `free` unknowns.
+pub(super) fn way(free: &[Unknown], from: &Unknowns, to: &Unknowns) -> Vec<f64> {
+    free.iter().map(|unknown| unknown.distance(from, to)).collect()
 }

@@ -49,6 +49,13 @@ pub(super) enum Differences {
     Central,
 }
 
+impl Effort {
+    /// Far from the end.
+    pub(super) const fn far(precision: Precision, jacobians: usize) -> Self {
+        Self { precision, jacobians, least_gain: 1.0, differences: Differences::OneSided }
+    }
+}
+
 /// That of the last stage.
 pub(super) const LAST_EFFORT: Effort = Effort {
     precision: Precision::LAST,
@@ -224,4 +231,49 @@ fn solve_for(normal: &Symmetric, gradient: &[f64], is_moved: &[bool], damping: f
         steps[index] = step * scale(index);
     }
     Some(steps)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::fixtures::{harmonic, sticking};
+    use super::super::simulation::SUBSTEPS;
+    use super::*;
+
+    const FREE: [Unknown; 4] = [Unknown::Offset, Unknown::VelocityGain, Unknown::Lag, Unknown::Coulomb];
+
+    fn squares(residuals: &Residuals) -> f64 {
+        residuals.iter().flatten().map(|value| value * value).sum()
+    }
+
+    /// From far off, with fewer simulations.
+    #[test]
+    fn a_search_ends_where_central_differences_end() {
+        let runs = harmonic();
+        let start = sticking().shifted(Unknown::VelocityGain, 0.2).shifted(Unknown::Coulomb, 200.0);
+        let end =
+            |differences| search(&runs, start, &FREE, Effort { differences, ..LAST_EFFORT }).expect("an end");
+        let (end, central) = (end(Differences::CentralAtEnd), end(Differences::Central));
+        assert!((end.misfit() - central.misfit()).abs() < 0.05, "{} {}", end.misfit(), central.misfit());
+        assert!(end.misfit() < MET * runs.readings(), "{} of {}", end.misfit(), runs.readings());
+    }
+
+    /// Just below a bound there is no room for a whole step up.
+    #[test]
+    fn one_sided_differences_keep_away_from_bounds() {
+        let runs = harmonic();
+        let lag_limit_s = runs.lag_limit_s();
+        let mut near = sticking();
+        near.set(Unknown::Lag, lag_limit_s - 1e-3 * Unknown::Lag.difference());
+        let column = |is_central: bool| {
+            let (columns, _) =
+                derivatives(&runs, &near, &[Unknown::Lag], SUBSTEPS, is_central).expect("numbers");
+            columns.into_iter().next().expect("a column")
+        };
+        let (mut difference, central) = (column(false), column(true));
+        for (one, other) in difference.iter_mut().flatten().zip(central.iter().flatten()) {
+            *one -= other;
+        }
+        let part = (squares(&difference) / squares(&central)).sqrt();
+        assert!(part < 1e-2, "{part}");
+    }
 }

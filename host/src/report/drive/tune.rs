@@ -167,9 +167,7 @@ fn of_axis(machine: &Machine, of: &TunedAxis<'_>, findings: &mut Findings) {
         ];
         let rows = rows.into_iter();
         let rows = rows.map(|(name, value, unit)| vec![name.to_owned(), value, unit.to_owned()]);
-        findings.words(
-            "Margins of the position loop, and within what the recordings tell them in 95 of 100 cases.",
-        );
+        findings.words("Margins of the position loop, with their 95 % intervals.");
         findings.table("Margins", &["*Margin", "Value", "*Unit"], rows);
     }
     findings.figures(of_drive(machine, of).into_iter().map(Figure::from));
