@@ -236,24 +236,23 @@ fn solve_for(normal: &Symmetric, gradient: &[f64], is_moved: &[bool], damping: f
 #[cfg(test)]
 mod tests {
     use super::super::fixtures::{harmonic, sticking};
+    use super::super::parameters::ALL;
     use super::super::simulation::SUBSTEPS;
     use super::*;
-
-    const FREE: [Unknown; 4] = [Unknown::Offset, Unknown::VelocityGain, Unknown::Lag, Unknown::Coulomb];
 
     fn squares(residuals: &Residuals) -> f64 {
         residuals.iter().flatten().map(|value| value * value).sum()
     }
 
-    /// From far off, with fewer simulations.
+    /// One motion leaves much open: with differences from one side alone a search ends 1.3 too early.
     #[test]
     fn a_search_ends_where_central_differences_end() {
         let runs = harmonic();
-        let start = sticking().shifted(Unknown::VelocityGain, 0.2).shifted(Unknown::Coulomb, 200.0);
+        let start = sticking().shifted(Unknown::VelocityGain, 0.02).shifted(Unknown::Coulomb, 10.0);
         let end =
-            |differences| search(&runs, start, &FREE, Effort { differences, ..LAST_EFFORT }).expect("an end");
+            |differences| search(&runs, start, &ALL, Effort { differences, ..LAST_EFFORT }).expect("an end");
         let (end, central) = (end(Differences::CentralAtEnd), end(Differences::Central));
-        assert!((end.misfit() - central.misfit()).abs() < 0.05, "{} {}", end.misfit(), central.misfit());
+        assert!((end.misfit() - central.misfit()).abs() < 0.5, "{} {}", end.misfit(), central.misfit());
         assert!(end.misfit() < MET * runs.readings(), "{} of {}", end.misfit(), runs.readings());
     }
 
@@ -263,7 +262,7 @@ mod tests {
         let runs = harmonic();
         let lag_limit_s = runs.lag_limit_s();
         let mut near = sticking();
-        near.set(Unknown::Lag, lag_limit_s - 1e-3 * Unknown::Lag.difference());
+        near.set(Unknown::Lag, lag_limit_s - 1e-8 * Unknown::Lag.difference());
         let column = |is_central: bool| {
             let (columns, _) =
                 derivatives(&runs, &near, &[Unknown::Lag], SUBSTEPS, is_central).expect("numbers");
@@ -274,6 +273,7 @@ mod tests {
             *one -= other;
         }
         let part = (squares(&difference) / squares(&central)).sqrt();
-        assert!(part < 1e-2, "{part}");
+        // 8e-3 towards the bound.
+        assert!(part < 1e-6, "{part}");
     }
 }
