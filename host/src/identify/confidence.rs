@@ -15,10 +15,11 @@
 //!
 //! Intervals of what is made from several unknowns, and of what has a bound, are not those of a parabola. So
 //! samples are drawn from the covariance, cut to the bounds, and the interval is what holds 95 of 100. Searches that end in
-//! other places, and a bed that is not told from chance, have their share of the samples, by their likelihood.
+//! other places, and beds that recordings do not show, have their share of the samples, by their likelihood.
 
+use super::bed::unseen_beds;
 use super::cholesky::{Lower, Symmetric};
-use super::parameters::{ALL, Unknown, Unknowns, way};
+use super::parameters::{Unknown, Unknowns, way};
 use super::readings::{Precision, Residuals, Runs, Weights, dot};
 use super::search::{Found, derivatives};
 use super::simulation::SUBSTEPS;
@@ -101,29 +102,28 @@ struct Place<'a> {
     factor: Lower,
 }
 
-/// A bed beside a rigid model, which recordings do not tell from chance.
-pub(super) struct UnprovenBed {
-    pub(super) unknowns: Unknowns,
-    /// Logarithm of its likelihood over that of the rigid model, by Schwarz.
-    pub(super) log_likelihood: f64,
-}
-
 impl<'a> Place<'a> {
     fn new(centre: Unknowns, free: &'a [Unknown], misfit: f64, information: Symmetric) -> Option<Self> {
         let factor = inverse_factor(&information)?;
         Some(Self { centre, free, misfit, information, factor })
     }
 
-    fn linearised(runs: &Runs, weights: &Weights, centre: Unknowns, free: &'a [Unknown]) -> Option<Self> {
+    /// With its columns of derivatives and its residuals.
+    fn linearised(
+        runs: &Runs,
+        weights: &Weights,
+        centre: Unknowns,
+        free: &'a [Unknown],
+    ) -> Option<(Self, Vec<Residuals>, Residuals)> {
         let (mut columns, residuals) = derivatives(runs, &centre, free, SUBSTEPS, true)?;
         let misfit = weights.misfits(&residuals).iter().sum();
         widen(runs, weights, &centre, free, &mut columns, &residuals);
-        let mut information = weights.sums(&columns, &residuals).normal;
+        let mut information = weights.columns(&columns).normal();
         for (index, unknown) in free.iter().enumerate() {
             // An unknown that no run shows ends with this width, far beyond what counts as determined.
             *information.at_mut(index, index) += unknown.ignorance().powi(-2);
         }
-        Self::new(centre, free, misfit, information)
+        Some((Self::new(centre, free, misfit, information)?, columns, residuals))
     }
 
     /// Whether the end of another search is the same place.
@@ -138,24 +138,19 @@ impl<'a> Place<'a> {
         wider - 0.5 * (self.misfit - other.misfit)
     }
 
-    fn sample(&self, chance: &mut Chance, lag_limit_s: f64) -> Unknowns {
+    /// A sample about `centre`, which is its own or that of another place of its width.
+    fn sample(&self, centre: Unknowns, chance: &mut Chance, lag_limit_s: f64) -> Unknowns {
         let normal: Vec<f64> = self.free.iter().map(|_| chance.normal()).collect();
         let steps = self.factor.times(&normal);
         let moved = self.free.iter().zip(steps);
-        let moved = moved.fold(self.centre, |sample, (&unknown, step)| sample.shifted(unknown, step));
+        let moved = moved.fold(centre, |sample, (&unknown, step)| sample.shifted(unknown, step));
         moved.bounded(self.free, lag_limit_s)
     }
 }
 
 /// The confidence of what a search over the `free` unknowns found, with weights that are up to date; `None` if it
 /// can't be linearised.
-pub(super) fn confidence(
-    runs: &mut Runs,
-    found: &Found,
-    free: &[Unknown],
-    unproven: Option<&UnprovenBed>,
-    left: f64,
-) -> Option<Confidence> {
+pub(super) fn confidence(runs: &mut Runs, found: &Found, free: &[Unknown], left: f64) -> Option<Confidence> {
     let whitened = runs.weights(Precision::LAST).whitened(&found.residuals);
     let factors: Vec<f64> = whitened.iter().map(|run| correlation_factor(run)).collect();
     // A remainder that counts as a whole counts once.
@@ -167,34 +162,62 @@ pub(super) fn confidence(
     runs.scale_variances(&counted);
     let weights = runs.weights(Precision::LAST);
     let lag_limit_s = runs.lag_limit_s();
-    let place = |centre: &Unknowns, free| Place::linearised(runs, &weights, *centre, free);
-    let mut places = vec![(place(&found.unknowns, free)?, 0.0)];
+    let place = |centre: &Unknowns| Place::linearised(runs, &weights, *centre, free);
+    let (first, columns, still) = place(&found.unknowns)?;
+    let mut places = vec![(first, 0.0)];
     for rival in &found.rivals {
         if places.iter().any(|(place, _)| place.is_at(rival)) {
             continue;
         }
         // A rival that can't be linearised is none.
-        let rival = place(rival, free);
-        places.extend(rival.map(|rival| {
+        let rival = place(rival);
+        places.extend(rival.map(|(rival, ..)| {
             let log_likelihood = rival.log_likelihood(&places[0].0);
             (rival, log_likelihood)
         }));
     }
-    places.extend(unproven.and_then(|bed| Some((place(&bed.unknowns, &ALL)?, bed.log_likelihood))));
-    let samples = samples(&places, lag_limit_s);
+    let mut chance = Chance(0x1DE7);
+    let mut samples = samples(&places, &mut chance, lag_limit_s);
+    // Beside a remainder, likelihoods mean nothing.
+    if found.unknowns.get(Unknown::BedMassRatio) == 0.0 && left == 0.0 {
+        let beds = drawn(&unseen_beds(runs, &weights, &found.unknowns, columns, &still));
+        let rigid = &places[0].0;
+        samples.extend(beds.into_iter().map(|bed| rigid.sample(bed, &mut chance, lag_limit_s)));
+    }
     Some(Confidence { best: found.unknowns, samples, widening: 1.0 + left.max(0.0).sqrt() / 1.96 })
 }
 
 /// Samples of places with their log-likelihoods over the first one's. That was found, and by more than its misfit: a filter has
 /// to be worth its unknown. So none has more samples.
-fn samples(places: &[(Place, f64)], lag_limit_s: f64) -> Vec<Unknowns> {
-    let mut chance = Chance(0x1DE7);
+fn samples(places: &[(Place, f64)], chance: &mut Chance, lag_limit_s: f64) -> Vec<Unknowns> {
     let mut samples = Vec::new();
     for (place, log_likelihood) in places {
         let count = (libm::exp(log_likelihood.min(0.0)) * SAMPLES as f64) as usize;
-        samples.extend((0..count).map(|_| place.sample(&mut chance, lag_limit_s)));
+        samples.extend((0..count).map(|_| place.sample(place.centre, chance, lag_limit_s)));
     }
     samples
+}
+
+/// Of sets of unknowns, each as often as it is likely; they have the logarithms of their likelihoods over what was found.
+fn drawn(sets: &[(Unknowns, f64)]) -> Vec<Unknowns> {
+    let sets = || sets.iter().filter(|(_, log_likelihood)| !log_likelihood.is_nan());
+    let most = sets().map(|(_, log_likelihood)| *log_likelihood).fold(f64::NEG_INFINITY, f64::max);
+    if most == f64::NEG_INFINITY {
+        return Vec::new();
+    }
+    let share = |log_likelihood: f64| libm::exp(log_likelihood - most);
+    let all: f64 = sets().map(|(_, log_likelihood)| share(*log_likelihood)).sum();
+    // What was found has no less.
+    let count = SAMPLES as f64 * libm::exp((libm::log(all) + most).min(0.0));
+    let mut due = 0.0;
+    let mut drawn = Vec::new();
+    for (set, log_likelihood) in sets() {
+        due += share(*log_likelihood) / all * count;
+        let times = due as usize;
+        due -= times as f64;
+        drawn.extend(core::iter::repeat_n(*set, times));
+    }
+    drawn
 }
 
 /// One standard deviation along the direction that is fixed worst, in the coordinates of the `free` unknowns.
@@ -261,7 +284,7 @@ fn widen(
     let mut known: Vec<Vec<f64>> = Vec::new();
     for _ in 0..WIDE_DIRECTIONS.min(free.len()) {
         for round in 1..=WIDE_ROUNDS {
-            let shown = Shown::of(weights.sums(columns, still).normal, free);
+            let shown = Shown::of(weights.columns(columns).normal(), free);
             let Some((step, direction)) = weakest(&shown, &known) else { return };
             let wide = wide_change(runs, centre, free, &step, still);
             let is_less =
@@ -357,8 +380,8 @@ impl Confidence {
 
 #[cfg(test)]
 mod tests {
-    use super::super::fixtures::{harmonic, sticking};
-    use super::super::parameters::without_bed;
+    use super::super::fixtures::{harmonic, recorded, sticking};
+    use super::super::parameters::{ALL, without_bed};
     use super::*;
 
     #[test]
@@ -402,7 +425,7 @@ mod tests {
         let (runs, found) = quiet();
         let free = [Unknown::Gain, Unknown::Offset, Unknown::Lag];
         let half_width = |left: f64| {
-            let confidence = confidence(&mut runs.clone(), &found, &free, None, left).expect("a confidence");
+            let confidence = confidence(&mut runs.clone(), &found, &free, left).expect("a confidence");
             confidence.estimate(|unknowns| unknowns.get(Unknown::Gain)).half_width_95
         };
         let part = half_width(0.0) / half_width(f64::MIN_POSITIVE);
@@ -417,23 +440,50 @@ mod tests {
         (runs, Found { unknowns, residuals, misfits, rivals: Vec::new() })
     }
 
+    /// As likely in all as what was found, a fifth as likely, and e⁵⁰⁰⁰ times as likely.
     #[test]
-    fn intervals_span_a_bed_that_is_not_proven() {
-        let (runs, found) = quiet();
-        let gain = found.unknowns.get(Unknown::VelocityGain);
-        let half_width = |log_likelihood: Option<f64>| {
-            let unknowns = found.unknowns.shifted(Unknown::VelocityGain, 0.05);
-            let bed = log_likelihood.map(|log_likelihood| UnprovenBed { unknowns, log_likelihood });
-            let confidence = confidence(&mut runs.clone(), &found, without_bed(), bed.as_ref(), 0.0);
-            confidence
-                .expect("a confidence")
-                .estimate(|unknowns| unknowns.get(Unknown::VelocityGain))
-                .half_width_95
+    fn sets_are_drawn_by_their_likelihood() {
+        let set = |gain: f64| sticking().shifted(Unknown::VelocityGain, gain);
+        let counts = |parts: [f64; 3], log: f64| {
+            let sets = [set(0.0), set(0.1), set(0.2)];
+            let drawn = drawn(&[0, 1, 2].map(|index| (sets[index], log + libm::log(parts[index]))));
+            sets.map(|set| drawn.iter().filter(|drawn| **drawn == set).count())
         };
-        let alone = half_width(None);
-        assert!(alone < 0.04 * gain, "{alone}");
-        assert!(half_width(Some(0.0)) > 0.05 * gain);
-        assert!((half_width(Some(-9.0)) / alone - 1.0).abs() < 0.01);
+        let is_near = |counts: [usize; 3], parts: [f64; 3]| {
+            counts
+                .into_iter()
+                .zip(parts)
+                .all(|(count, part)| (count as f64 - part * SAMPLES as f64).abs() <= 1.0)
+        };
+        assert!(is_near(counts([0.5, 0.3, 0.2], 0.0), [0.5, 0.3, 0.2]));
+        assert!(is_near(counts([0.1, 0.06, 0.04], 0.0), [0.1, 0.06, 0.04]));
+        assert!(is_near(counts([0.5, 0.3, 0.2], 5000.0), [0.5, 0.3, 0.2]));
+        assert!(is_near(counts([f64::NAN, 0.6, 0.0], 0.0), [0.0, 0.6, 0.0]));
+        assert_eq!(counts([0.0; 3], 0.0), [0; 3]);
+    }
+
+    /// What an axis on a bed of a small mass ratio shows in slow motion is an axis without one. Its current lag is known less well
+    /// then.
+    #[test]
+    fn intervals_span_beds_that_are_not_shown() {
+        let mut rigid = sticking();
+        rigid.set(Unknown::BedMassRatio, 0.0);
+        let steps = |tick: usize| if (300..1500).contains(&tick) { 40.0 } else { 0.0 };
+        let run = recorded(&rigid, (0..3000).map(steps).collect(), 5e-3);
+        let mut runs = Runs::new(&[run], 5e-3);
+        runs.regroup(&rigid, SUBSTEPS);
+        let residuals = runs.residuals(&[rigid], SUBSTEPS).remove(0).expect("numbers");
+        let misfits = runs.weights(Precision::LAST).misfits(&residuals);
+        let found = Found { unknowns: rigid, residuals, misfits, rivals: Vec::new() };
+        let confidence =
+            |left: f64| confidence(&mut runs.clone(), &found, without_bed(), left).expect("a confidence");
+        let beds = |confidence: &Confidence| {
+            confidence.samples.iter().filter(|sample| sample.get(Unknown::BedMassRatio) > 0.0).count()
+        };
+        let spanned = confidence(0.0);
+        assert!((SAMPLES / 50..=SAMPLES).contains(&beds(&spanned)), "{}", beds(&spanned));
+        // A likelihood means nothing where the model does not follow.
+        assert_eq!(beds(&confidence(f64::MIN_POSITIVE)), 0);
     }
 
     /// A place off by `offset`, and its standard deviation there.
@@ -455,7 +505,8 @@ mod tests {
         assert!((log(place(&FREE, 10.0, 0.4, 104.0)) - 4.0_f64.ln() + 2.0).abs() < 1e-9);
         // Samples of both places, which are far apart.
         let counts = |log_likelihood: f64| {
-            let all = samples(&[(first(), 0.0), (place(&ALL, 10.0, 0.1, 90.0), log_likelihood)], 1.0);
+            let places = [(first(), 0.0), (place(&ALL, 10.0, 0.1, 90.0), log_likelihood)];
+            let all = samples(&places, &mut Chance(1), 1.0);
             let middle = sticking().shifted(Unknown::Offset, 5.0).get(Unknown::Offset);
             let of_other = all.iter().filter(|sample| sample.get(Unknown::Offset) > middle).count();
             [all.len() - of_other, of_other]

@@ -3,6 +3,7 @@
 use hal_sim::{BedMode, DriveParameters};
 
 use super::harmonic_reading::{Bandwidth, HarmonicReading};
+use super::parameters::Unknowns;
 use super::step_reading::StepReading;
 
 /// Half an interval over the value, up to which a value counts as determined.
@@ -58,6 +59,13 @@ impl BedEstimate {
     #[must_use]
     pub fn resonance_hz(&self) -> f64 {
         self.frequency_hz.value / (1.0 + self.mass_ratio.value).sqrt()
+    }
+
+    /// The time in which it then decays by e: (1 + mass ratio)/(damping ratio · 2π · frequency) \[s\].
+    #[must_use]
+    pub fn decay_s(&self) -> f64 {
+        let omega_per_s = core::f64::consts::TAU * self.frequency_hz.value;
+        (1.0 + self.mass_ratio.value) / (self.damping_ratio.value * omega_per_s)
     }
 }
 
@@ -189,6 +197,8 @@ pub struct Identification {
     pub parameters: AxisParametersFound,
     /// Other drives that the recordings allow.
     pub alternatives: Alternatives,
+    /// Where the search ended, and its rivals: for one with further recordings.
+    pub(super) ends: Vec<Unknowns>,
     /// The figures that need no model.
     pub figures: Figures,
     /// The residuals by run, in the order given.

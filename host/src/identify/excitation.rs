@@ -7,6 +7,7 @@
 use core::f64::consts::PI;
 
 use super::differences::Parabolas;
+use super::estimate::BedEstimate;
 use super::recording::AxisRecording;
 
 /// The part of what an axis reaches that it may take: drift and trim need some of the output, too.
@@ -34,6 +35,10 @@ const HARMONIC_ACCEL: f64 = 0.4;
 /// The slow ones' velocity, over the steps'.
 const SLOW_SHARE: f64 = 0.15;
 
+/// Harmonic motion at the resonance of a bed, over the time in which that decays by e, and its greatest length \[s\].
+const DECAYS: f64 = 2.0;
+const AT_RESONANCE_S_MAX: f64 = 4.0;
+
 /// Ticks of the shortest period.
 const PERIOD_TICKS_MIN: f64 = 10.0;
 
@@ -46,6 +51,29 @@ pub struct Reach {
     pub fastest_mm_s: f64,
     /// Acceleration \[mm/s²\], > 0: about what its drive gives it.
     pub accel_mm_s2: f64,
+}
+
+impl Reach {
+    /// That of an axis of which `first_look` was recorded.
+    #[must_use]
+    pub fn seen(first_look: &AxisRecording, fastest_mm_s: f64) -> Self {
+        Self { tick_s: first_look.tick_s, fastest_mm_s, accel_mm_s2: accel_mm_s2(first_look) }
+    }
+
+    /// The fastest step \[mm/s\].
+    fn step_mm_s(&self) -> f64 {
+        FASTEST_MM_S.min(REACH_SHARE * self.fastest_mm_s).min(RISE_S * self.accel_mm_s2)
+    }
+
+    /// The amplitude of harmonic motion \[mm/s\].
+    fn harmonic_mm_s(&self, frequency_hz: f64) -> f64 {
+        HARMONIC_ACCEL * self.accel_mm_s2 / (2.0 * PI * frequency_hz)
+    }
+
+    /// The highest frequency of harmonic motion \[Hz\].
+    fn highest_hz(&self) -> f64 {
+        1.0 / (PERIOD_TICKS_MIN * self.tick_s)
+    }
 }
 
 /// A motion of one axis about its starting point, as the commanded velocity over time.
@@ -84,23 +112,36 @@ pub fn first_look(fastest_mm_s: f64) -> Excitation {
 /// and harmonic motion stays within two fifths of it.
 #[must_use]
 pub fn identification_plan(reach: &Reach) -> Vec<Excitation> {
-    let &Reach { tick_s, fastest_mm_s, accel_mm_s2 } = reach;
-    let step_mm_s = FASTEST_MM_S.min(REACH_SHARE * fastest_mm_s).min(RISE_S * accel_mm_s2);
+    let step_mm_s = reach.step_mm_s();
     let steps = (0..STEPS).map(|step| {
         let feed_mm_s = step_mm_s / STEP_RATIO.powi(step);
-        let cruise_s = 0.2 + 1.5 * feed_mm_s / accel_mm_s2;
+        let cruise_s = 0.2 + 1.5 * feed_mm_s / reach.accel_mm_s2;
         Excitation::Steps { feed_mm_s, cruise_s, rest_s: 0.15 }
     });
     let harmonic = |frequency_hz: f64, most_mm_s: f64| Excitation::Harmonic {
-        amplitude_mm_s: (HARMONIC_ACCEL * accel_mm_s2 / (2.0 * PI * frequency_hz)).min(most_mm_s),
+        amplitude_mm_s: reach.harmonic_mm_s(frequency_hz).min(most_mm_s),
         frequency_hz,
         // Whole and small.
         periods: (HARMONIC_S * frequency_hz).round().clamp(PERIODS.0, PERIODS.1) as u32,
     };
     let slow = SLOW_HZ.into_iter().map(|hz| harmonic(hz, SLOW_SHARE * step_mm_s));
-    let highest_hz = 1.0 / (PERIOD_TICKS_MIN * tick_s);
-    let fast = HARMONIC_HZ.into_iter().filter(|hz| *hz <= highest_hz).map(|hz| harmonic(hz, 0.5 * step_mm_s));
-    steps.chain(slow).chain(fast).collect()
+    let fast = HARMONIC_HZ.into_iter().filter(|hz| *hz <= reach.highest_hz());
+    steps.chain(slow).chain(fast.map(|hz| harmonic(hz, 0.5 * step_mm_s))).collect()
+}
+
+/// Harmonic motion at the resonance of a bed, until it has built up. The plan's runs are too short for a bed that decays slowly: how
+/// high it builds up tells its damping. The axis is asked for no more than in the plan, but a bed that pushes back brings the drive
+/// to its current limit, as steps do. With less motion it would be told no better than by the plan. `None` above the highest
+/// frequency of the plan.
+#[must_use]
+pub fn at_resonance(reach: &Reach, bed: &BedEstimate) -> Option<Excitation> {
+    let frequency_hz = bed.resonance_hz();
+    let time_s = (DECAYS * bed.decay_s()).clamp(HARMONIC_S, AT_RESONANCE_S_MAX);
+    (frequency_hz <= reach.highest_hz()).then(|| Excitation::Harmonic {
+        amplitude_mm_s: reach.harmonic_mm_s(frequency_hz).min(0.5 * reach.step_mm_s()),
+        frequency_hz,
+        periods: (time_s * frequency_hz).round().max(PERIODS.0) as u32,
+    })
 }
 
 /// Records an axis by `record`: a first look, and then what [`identification_plan`] asks of it.
@@ -108,13 +149,11 @@ pub fn identification_plan(reach: &Reach) -> Vec<Excitation> {
 /// # Errors
 /// Those of `record`.
 pub fn explore<E>(
-    tick_s: f64,
     fastest_mm_s: f64,
     mut record: impl FnMut(&Excitation) -> Result<AxisRecording, E>,
 ) -> Result<Vec<AxisRecording>, E> {
     let mut runs = vec![record(&first_look(fastest_mm_s))?];
-    let accel_mm_s2 = accel_mm_s2(&runs[0]);
-    for excitation in identification_plan(&Reach { tick_s, fastest_mm_s, accel_mm_s2 }) {
+    for excitation in identification_plan(&Reach::seen(&runs[0], fastest_mm_s)) {
         runs.push(record(&excitation)?);
     }
     Ok(runs)
@@ -211,6 +250,34 @@ mod tests {
             assert!((greatest_mm_s(fastest_mm_s) - REACH_SHARE * fastest_mm_s).abs() < 1e-9);
         }
         assert!((greatest_mm_s(1000.0) - 159.15).abs() < 1e-9);
+    }
+
+    /// A bed that decays in 0.52 s, one that does in 6.8 s, and one that does at once.
+    #[test]
+    fn a_bed_builds_up_at_its_resonance() {
+        let reach = Reach { tick_s: 0.5e-3, fastest_mm_s: 333.0, accel_mm_s2: 12_300.0 };
+        let of = |value: f64| crate::identify::Estimate { value, half_width_95: 0.0 };
+        let bed = |frequency_hz: f64, damping_ratio: f64, mass_ratio: f64| BedEstimate {
+            frequency_hz: of(frequency_hz),
+            damping_ratio: of(damping_ratio),
+            mass_ratio: of(mass_ratio),
+        };
+        for (bed, resonance_hz, time_s) in [
+            (bed(60.0, 0.0064, 0.25), 53.666, 1.04),
+            (bed(5.2, 0.0054, 0.2), 4.747, 4.0),
+            (bed(20.0, 0.1, 0.1), 19.069, 0.45),
+        ] {
+            let Some(Excitation::Harmonic { amplitude_mm_s, frequency_hz, periods }) =
+                at_resonance(&reach, &bed)
+            else {
+                panic!("no harmonic motion");
+            };
+            assert!((frequency_hz - resonance_hz).abs() < 1e-3, "{frequency_hz} Hz");
+            assert!((f64::from(periods) / frequency_hz - time_s).abs() < 0.6 / frequency_hz, "{periods}");
+            let accel_mm_s2 = amplitude_mm_s * 2.0 * PI * frequency_hz;
+            assert!(accel_mm_s2 <= 0.4 * 12_300.0 + 1e-6 && amplitude_mm_s <= 79.6, "{amplitude_mm_s} mm/s");
+        }
+        assert_eq!(at_resonance(&reach, &bed(230.0, 0.01, 0.1)), None);
     }
 
     /// Steps saturate a drive for 0.15 s at most, and harmonic motion never does.

@@ -4,9 +4,9 @@
 //! A search ends in the nearest valley. So several are made, and the deepest end counts. Whether that is the
 //! right one can be seen: a right model leaves the errors of the readings and nothing else.
 
-use super::bed::likely_beds;
+use super::bed::{LEAST_RATIO, likely_beds};
 use super::coarse::{coarse, sustained_accel_mm_s2};
-use super::confidence::{Confidence, UnprovenBed, confidence};
+use super::confidence::{Confidence, confidence};
 use super::parameters::{ALL, Unknown, Unknowns, without_bed};
 use super::readings::{Precision, Runs};
 use super::recording::{AxisRecording, span};
@@ -49,15 +49,14 @@ const BED_GAIN: f64 = 12.0;
 /// Two searches for one minimum end this far apart: positions are stairs where the limit acts, if low ones.
 const STAIRS: f64 = 10.0;
 
-/// Mass ratio below which a bed is none: it moves the axis by less than what the model leaves out.
-const LEAST_RATIO: f64 = 2e-3;
-
 /// Root mean square of the residuals over the travel, above which the model is none.
 const MISS_MAX: f64 = 0.05;
 
 pub(super) struct Fit {
     pub(super) parameters: AxisParametersFound,
     pub(super) alternatives: Alternatives,
+    /// What was found, and its rivals.
+    pub(super) ends: Vec<Unknowns>,
     pub(super) runs: Vec<RunMatch>,
     pub(super) misfit_per_reading: f64,
 }
@@ -72,17 +71,31 @@ pub(super) fn fit(recordings: &[AxisRecording], resolution_mm: f64) -> Result<Fi
     concluded(recordings, search.runs, &model).ok_or(too_late)?
 }
 
+/// Fits the model from the `ends` of an earlier fit on: what was found, and its rivals. `None` if it does not follow all recordings
+/// from there.
+pub(super) fn refit(recordings: &[AxisRecording], resolution_mm: f64, ends: &[Unknowns]) -> Option<Fit> {
+    let (&start, rivals) = ends.split_first()?;
+    let mut runs = Runs::new(recordings, resolution_mm);
+    runs.regroup(&start, SUBSTEPS);
+    let stages = Stages { runs, accel_mm_s2: sustained_accel_mm_s2(recordings) };
+    let model = stages.again(start, rivals)?;
+    let is_followed = model.found.misfit() < FOLLOWED_WELL * stages.readings();
+    if is_followed { concluded(recordings, stages.runs, &model)?.ok() } else { None }
+}
+
 /// A model that was found.
 struct Model {
     found: Found,
     free: &'static [Unknown],
-    /// Beside a rigid model: a bed that explains more, if not so much more that it is one.
-    unproven: Option<Unknowns>,
 }
 
 impl Model {
     fn with_bed(found: Found) -> Self {
-        Self { found, free: &ALL, unproven: None }
+        Self { found, free: &ALL }
+    }
+
+    fn rigid(found: Found) -> Self {
+        Self { found, free: without_bed() }
     }
 
     fn has_bed(&self) -> bool {
@@ -133,25 +146,34 @@ impl Stages {
         })
     }
 
+    /// From an earlier end: the same with readings that it was not made of. A bed has to explain enough of them, too.
+    fn again(&self, start: Unknowns, rivals: &[Unknowns]) -> Option<Model> {
+        let has_bed = start.get(Unknown::BedMassRatio) > 0.0;
+        let free = if has_bed { &ALL } else { without_bed() };
+        let found = Found { rivals: rivals.to_vec(), ..search(&self.runs, start, free, LAST_EFFORT)? };
+        if !has_bed {
+            return Some(Model::rigid(found));
+        }
+        Some(match self.rigid_from(&found) {
+            Some(rigid) => self.with_or_without(rigid, Some(found)),
+            None => Model::with_bed(found),
+        })
+    }
+
     /// The one that explains more; a bed has to explain enough.
     fn better(&self, one: Model, other: Model) -> Model {
-        let known = one.unproven.or(other.unproven);
-        let better = match (one.has_bed(), other.has_bed()) {
+        match (one.has_bed(), other.has_bed()) {
             (false, true) => self.with_or_without(one.found, Some(other.found)),
             (true, false) => self.with_or_without(other.found, Some(one.found)),
             _ if other.found.misfit() < one.found.misfit() => other,
             _ => one,
-        };
-        if better.has_bed() { better } else { Model { unproven: better.unproven.or(known), ..better } }
+        }
     }
 
-    /// The bed if it is one; else the rigid model, beside which a bed that explains more is not proven.
+    /// The bed if it is one; else the rigid model.
     fn with_or_without(&self, rigid: Found, bed: Option<Found>) -> Model {
-        let bed = match bed {
-            Some(bed) if self.is_bed(&rigid, &bed) => return Model::with_bed(bed),
-            bed => bed.filter(|bed| is_heavy(bed) && gain(&self.runs, &rigid, bed) > 0.0),
-        };
-        Model { found: rigid, free: without_bed(), unproven: bed.map(|bed| bed.unknowns) }
+        let bed = bed.filter(|bed| self.is_bed(&rigid, bed));
+        bed.map_or(Model::rigid(rigid), Model::with_bed)
     }
 
     /// The rigid model as it is found from a bed, where it is not far worse.
@@ -305,11 +327,6 @@ fn concluded(
         runs.rescale(&found.misfits);
         found = Found { rivals: found.rivals, ..search(&runs, found.unknowns, free, SETTLING_EFFORT)? };
     }
-    let unproven = model.unproven.and_then(|bed| search(&runs, bed, &ALL, SETTLING_EFFORT));
-    let unproven = unproven.map(|bed| UnprovenBed {
-        unknowns: bed.unknowns,
-        log_likelihood: 0.5 * (gain(&runs, &found, &bed) - bed_price(&runs)),
-    });
     if let Some(simpler) = without_filter(&runs, &found, free) {
         found = simpler;
     }
@@ -318,11 +335,12 @@ fn concluded(
         Err(error) => return Some(Err(error)),
     };
     let left = if is_met { 0.0 } else { misfit - readings };
-    let confidence = confidence(&mut runs, &found, free, unproven.as_ref(), left)?;
+    let confidence = confidence(&mut runs, &found, free, left)?;
     let tick_s = recordings[0].tick_s;
     Some(Ok(Fit {
         parameters: estimates(&confidence, &found, tick_s),
         alternatives: confidence.alternatives(),
+        ends: [found.unknowns].into_iter().chain(found.rivals.iter().copied()).collect(),
         runs: matches,
         misfit_per_reading: misfit / readings,
     }))
@@ -410,41 +428,38 @@ mod tests {
 
     /// Three logarithms of 4000 readings are 25, and 12 more are asked for.
     #[test]
-    fn a_bed_that_gains_too_little_is_not_proven() {
+    fn a_bed_has_to_gain_enough() {
         let stages = stages();
         assert!((bed_price(&stages.runs) - 24.88).abs() < 0.01);
-        for (mass_ratio, gain, is_bed, is_unproven) in [
-            (0.05, 38.0, true, false),
-            (0.05, 36.0, false, true),
-            (0.05, 1.0, false, true),
-            (0.05, -1.0, false, false),
-            (1e-3, 38.0, false, false),
-        ] {
+        for (mass_ratio, gain, is_bed) in
+            [(0.05, 38.0, true), (0.05, 36.0, false), (0.05, -1.0, false), (1e-3, 38.0, false)]
+        {
             let model = stages.with_or_without(found(0.0, 3900.0), Some(found(mass_ratio, 3900.0 - gain)));
-            assert_eq!((model.has_bed(), model.unproven.is_some()), (is_bed, is_unproven), "{gain}");
+            assert_eq!(model.has_bed(), is_bed, "{gain}");
         }
     }
 
-    /// Whichever of two rigid models is better, and whichever came first.
+    /// Whichever came first.
     #[test]
-    fn a_bed_that_is_not_proven_stays_beside_another_model() {
+    fn the_better_model_is_kept() {
         let stages = stages();
-        let bed = || Model::with_bed(found(0.05, 3890.0));
-        let rigid = |misfit: f64, bed: Option<f64>| Model {
-            found: found(0.0, misfit),
-            free: without_bed(),
-            unproven: bed.map(|mass_ratio| found(mass_ratio, 0.0).unknowns),
-        };
-        for model in [
-            stages.better(bed(), rigid(3900.0, None)),
-            stages.better(rigid(3900.0, None), bed()),
-            stages.better(rigid(3900.0, None), rigid(3910.0, Some(0.05))),
-            stages.better(rigid(3910.0, Some(0.05)), rigid(3900.0, Some(0.1))),
+        let bed = |misfit: f64| Model::with_bed(found(0.05, misfit));
+        let rigid = |misfit: f64| Model::rigid(found(0.0, misfit));
+        for (one, other, misfit) in [
+            (bed(3890.0), rigid(3900.0), 3900.0),
+            (bed(3800.0), rigid(3900.0), 3800.0),
+            (rigid(3900.0), rigid(3910.0), 3900.0),
+            (bed(3800.0), bed(3700.0), 3700.0),
         ] {
-            assert!(!model.has_bed() && model.unproven.is_some());
-            assert!((model.found.misfit() - 3900.0).abs() < 1e-9);
+            let again = |model: &Model| Model {
+                found: found(model.found.unknowns.get(Unknown::BedMassRatio), model.found.misfit()),
+                free: model.free,
+            };
+            for better in
+                [stages.better(again(&one), again(&other)), stages.better(again(&other), again(&one))]
+            {
+                assert!((better.found.misfit() - misfit).abs() < 1e-9, "{}", better.found.misfit());
+            }
         }
-        let proven = stages.better(rigid(3900.0, Some(0.1)), Model::with_bed(found(0.05, 3800.0)));
-        assert!(proven.has_bed() && proven.unproven.is_none());
     }
 }

@@ -109,7 +109,7 @@ impl Unknown {
     }
 
     /// The greatest step of one iteration, in the search's coordinate.
-    fn reach(self) -> f64 {
+    pub(super) fn reach(self) -> f64 {
         match self {
             Gain => 0.05,
             Offset => 5.0,

@@ -78,15 +78,6 @@ pub(super) struct Runs {
 /// Residuals of the groups by run \[mm\].
 pub(super) type Residuals = Vec<Vec<f64>>;
 
-/// The sums that a step needs, offsets already taken off.
-#[derive(Clone, Debug)]
-pub(super) struct Sums {
-    /// JᵀWJ.
-    pub(super) normal: Symmetric,
-    /// JᵀWr.
-    pub(super) gradient: Vec<f64>,
-}
-
 /// The weights of a run, and its offsets.
 struct Whitening {
     roots: Vec<f64>,
@@ -120,38 +111,12 @@ impl Weights {
         self.0.iter().zip(residuals).map(of_run).collect()
     }
 
-    /// The sums for columns of derivatives, given as residuals by column.
-    pub(super) fn sums(&self, columns: &[Residuals], residuals: &Residuals) -> Sums {
-        let count = columns.len();
-        let mut sums = Sums { normal: Symmetric::zero(count), gradient: vec![0.0; count] };
-        for (index, whitening) in self.0.iter().enumerate() {
-            let all: Vec<_> = columns.iter().map(|column| whitening.of(&column[index])).collect();
-            let (left, left_common) = whitening.of(&residuals[index]);
-            for (row, (weighted, common)) in all.iter().enumerate() {
-                for (column, (other, other_common)) in all.iter().enumerate().take(row + 1) {
-                    let value = dot(weighted, other) - dot(common, other_common);
-                    *sums.normal.at_mut(row, column) += value;
-                    if row != column {
-                        *sums.normal.at_mut(column, row) += value;
-                    }
-                }
-                sums.gradient[row] += dot(weighted, &left) - dot(common, &left_common);
-            }
-        }
-        sums
-    }
-
-    /// The gradient alone.
-    pub(super) fn gradient(&self, columns: &[Residuals], residuals: &Residuals) -> Vec<f64> {
-        let mut gradient = vec![0.0; columns.len()];
-        for ((index, whitening), residuals) in self.0.iter().enumerate().zip(residuals) {
-            let (left, left_common) = whitening.of(residuals);
-            for (sum, column) in gradient.iter_mut().zip(columns) {
-                let (weighted, common) = whitening.of(&column[index]);
-                *sum += dot(&weighted, &left) - dot(&common, &left_common);
-            }
-        }
-        gradient
+    /// Columns of derivatives, given as residuals by column.
+    pub(super) fn columns(&self, columns: &[Residuals]) -> Columns<'_> {
+        let of_run = |(index, whitening): (usize, &Whitening)| {
+            columns.iter().map(|column| whitening.of(&column[index])).collect()
+        };
+        Columns { weights: self, count: columns.len(), runs: self.0.iter().enumerate().map(of_run).collect() }
     }
 
     /// The weighted residuals of each run, less what its offsets explain: white, with a variance of 1, where the
@@ -168,6 +133,45 @@ impl Weights {
             weighted
         };
         self.0.iter().zip(residuals).map(of_run).collect()
+    }
+}
+
+/// Columns of derivatives, weighted, run by run.
+pub(super) struct Columns<'a> {
+    weights: &'a Weights,
+    count: usize,
+    /// With the coefficients that offsets take off.
+    runs: Vec<Vec<(Vec<f64>, Vec<f64>)>>,
+}
+
+impl Columns<'_> {
+    /// JᵀWJ, offsets taken off.
+    pub(super) fn normal(&self) -> Symmetric {
+        let mut normal = Symmetric::zero(self.count);
+        for columns in &self.runs {
+            for (row, (weighted, common)) in columns.iter().enumerate() {
+                for (column, (other, other_common)) in columns.iter().enumerate().take(row + 1) {
+                    let value = dot(weighted, other) - dot(common, other_common);
+                    *normal.at_mut(row, column) += value;
+                    if row != column {
+                        *normal.at_mut(column, row) += value;
+                    }
+                }
+            }
+        }
+        normal
+    }
+
+    /// JᵀWr, offsets taken off.
+    pub(super) fn gradient(&self, residuals: &Residuals) -> Vec<f64> {
+        let mut gradient = vec![0.0; self.count];
+        for ((columns, whitening), residuals) in self.runs.iter().zip(&self.weights.0).zip(residuals) {
+            let (left, left_common) = whitening.of(residuals);
+            for (sum, (weighted, common)) in gradient.iter_mut().zip(columns) {
+                *sum += dot(weighted, &left) - dot(common, &left_common);
+            }
+        }
+        gradient
     }
 }
 
@@ -324,7 +328,10 @@ impl Runs {
             }
         }
         all.into_iter()
-            .map(|residuals| residuals.iter().flatten().all(|value| value.is_finite()).then_some(residuals))
+            .map(|residuals| {
+                let is_finite = |run: &Vec<f64>| run.iter().all(|value| value.is_finite());
+                residuals.iter().all(is_finite).then_some(residuals)
+            })
             .collect()
     }
 
@@ -407,7 +414,20 @@ fn normal(columns: &[Vec<f64>]) -> Symmetric {
     normal
 }
 
-/// Σ a·b.
+/// Sums side by side: one alone waits for each addition.
+const SUMS: usize = 8;
+
+/// Σ a·b, over the shorter of both.
 pub(super) fn dot(left: &[f64], right: &[f64]) -> f64 {
-    left.iter().zip(right).map(|(left, right)| left * right).sum()
+    let count = left.len().min(right.len());
+    let (left, right) = (&left[..count], &right[..count]);
+    let ((left, left_rest), (right, right_rest)) = (left.as_chunks::<SUMS>(), right.as_chunks::<SUMS>());
+    let mut sums = [0.0; SUMS];
+    for (left, right) in left.iter().zip(right) {
+        for (sum, (left, right)) in sums.iter_mut().zip(left.iter().zip(right)) {
+            *sum += left * right;
+        }
+    }
+    let rest: f64 = left_rest.iter().zip(right_rest).map(|(left, right)| left * right).sum();
+    sums.iter().sum::<f64>() + rest
 }

@@ -7,7 +7,7 @@
 use super::cholesky::Symmetric;
 use super::estimate::MET;
 use super::parameters::{Unknown, Unknowns};
-use super::readings::{Precision, Residuals, Runs, Sums};
+use super::readings::{Precision, Residuals, Runs};
 use super::simulation::LANES;
 
 /// The end of a search.
@@ -145,20 +145,21 @@ pub(super) fn search(runs: &Runs, start: Unknowns, free: &[Unknown], effort: Eff
     for _ in 0..jacobians {
         let unknowns = found.as_ref().map_or(start, |found| found.unknowns);
         let (columns, residuals) = derivatives(runs, &unknowns, free, precision.substeps, is_central)?;
-        let mut sums = weights.sums(&columns, &residuals);
+        let columns = weights.columns(&columns);
+        let normal = columns.normal();
         let misfits = weights.misfits(&residuals);
         let mut best = Found { unknowns, residuals, misfits, rivals: Vec::new() };
         let first = best.misfit();
         for round in 0..STEPS_PER_JACOBIAN {
             let before = best.misfit();
-            if round > 0 {
-                sums.gradient = weights.gradient(&columns, &best.residuals);
-            }
+            let gradient = columns.gradient(&best.residuals);
             let dampings = DAMPINGS.map(|factor| (damping * factor).clamp(1e-9, 1e9));
             let from = best.unknowns;
             let tried: Vec<Unknowns> = dampings
                 .iter()
-                .map(|damping| step(&sums, &from, free, *damping, runs.lag_limit_s()).unwrap_or(from))
+                .map(|damping| {
+                    step(&normal, &gradient, &from, free, *damping, runs.lag_limit_s()).unwrap_or(from)
+                })
                 .collect();
             let results = runs.residuals(&tried, precision.substeps);
             for ((unknowns, residuals), tried_damping) in tried.into_iter().zip(results).zip(dampings) {
@@ -191,22 +192,36 @@ pub(super) fn search(runs: &Runs, start: Unknowns, free: &[Unknown], effort: Eff
     found
 }
 
-/// The unknowns after a damped step; those at a bound that it would cross stay there.
+/// The unknowns after a damped step.
 fn step(
-    sums: &Sums,
+    normal: &Symmetric,
+    gradient: &[f64],
     unknowns: &Unknowns,
     free: &[Unknown],
     damping: f64,
     lag_limit_s: f64,
 ) -> Option<Unknowns> {
-    let mut is_moved: Vec<bool> = (0..free.len()).map(|index| sums.normal.at(index, index) > 0.0).collect();
+    let steps = damped(normal, gradient, unknowns, free, damping, lag_limit_s)?;
+    Some(unknowns.moved(free, &steps, lag_limit_s))
+}
+
+/// −(JᵀJ + damping·diag)⁻¹·Jᵀr; 0 for unknowns that nothing shows, and for those at a bound that they would cross.
+pub(super) fn damped(
+    normal: &Symmetric,
+    gradient: &[f64],
+    unknowns: &Unknowns,
+    free: &[Unknown],
+    damping: f64,
+    lag_limit_s: f64,
+) -> Option<Vec<f64>> {
+    let mut is_moved: Vec<bool> = (0..free.len()).map(|index| normal.at(index, index) > 0.0).collect();
     for _ in 0..free.len() {
-        let steps = solve_for(&sums.normal, &sums.gradient, &is_moved, damping)?;
+        let steps = solve_for(normal, gradient, &is_moved, damping)?;
         let crossing = (0..free.len())
             .find(|&index| is_moved[index] && unknowns.is_held(free[index], steps[index], lag_limit_s));
         match crossing {
             Some(index) => is_moved[index] = false,
-            None => return Some(unknowns.moved(free, &steps, lag_limit_s)),
+            None => return Some(steps),
         }
     }
     None

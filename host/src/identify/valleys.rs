@@ -113,8 +113,8 @@ struct Valley {
 
 impl Valley {
     fn of(runs: &Runs, end: Found, free: &[Unknown]) -> Option<Self> {
-        let (columns, residuals) = derivatives(runs, &end.unknowns, free, SUBSTEPS, true)?;
-        let information = runs.weights(Precision::LAST).sums(&columns, &residuals).normal;
+        let (columns, _) = derivatives(runs, &end.unknowns, free, SUBSTEPS, true)?;
+        let information = runs.weights(Precision::LAST).columns(&columns).normal();
         Some(Self { end, information })
     }
 

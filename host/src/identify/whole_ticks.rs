@@ -240,35 +240,39 @@ impl Start {
         end: &State,
         tick_s: f64,
     ) -> bool {
-        let mut is_without = true;
-        for lane in 0..LANES {
-            let (start, last, limit) = (self.demand[lane], end.demand[lane], model.limit[lane]);
-            // What the demand, and what the acceleration may vary by.
-            let varies = (last - start).abs() + model.velocity_gain[lane] * self.jump[lane];
-            let bed_varies = (end.bed_accel[lane] - state.bed_accel[lane]).abs();
-            let slides = |accel_varies: f64| {
-                let sign = state.velocity[lane].signum();
-                let least = (sign * state.velocity[lane]).min(sign * end.velocity[lane]);
-                least > 0.5 * tick_s * (accel_varies + bed_varies)
-            };
-            let is_within = start.abs().max(last.abs()) + varies < (1.0 - CROSSING) * limit;
-            let pushes = (start - state.torque[lane]).abs() + varies;
-            is_without &= match regime {
-                Regime::Sliding => is_within && slides(pushes),
-                Regime::Stuck => {
-                    let pushed = (state.torque[lane] - state.bed_accel[lane]).abs() + pushes + bed_varies;
-                    is_within && model.step_s * pushed < model.coulomb_step[lane]
-                }
-                Regime::Saturated => {
-                    let sign = start.signum();
-                    let error = end.command[lane] - end.velocity[lane];
-                    let error_varies = (error - self.error[lane]).abs() + self.jump[lane];
-                    (sign * start).min(sign * last) - varies > (1.0 + CROSSING) * limit
-                        && sign * self.error[lane] > error_varies
-                        && slides(2.0 * (sign * limit - state.torque[lane]).abs())
-                }
-            };
-        }
-        is_without
+        let of = |lane: &Lane| f64x4::from(*lane);
+        let (start, last, limit, jump) =
+            (of(&self.demand), of(&end.demand), of(&model.limit), of(&self.jump));
+        let half = f64x4::splat(0.5 * tick_s);
+        // What the demand, and what the acceleration may vary by.
+        let varies = (last - start).abs() + of(&model.velocity_gain) * jump;
+        let bed_varies = (of(&end.bed_accel) - of(&state.bed_accel)).abs();
+        let sign_of = |value: f64x4| f64x4::ONE.copysign(value);
+        let slides = |accel_varies: f64x4| {
+            let sign = sign_of(of(&state.velocity));
+            let least = (sign * of(&state.velocity)).fast_min(sign * of(&end.velocity));
+            least.simd_gt(half * (accel_varies + bed_varies))
+        };
+        let within = f64x4::splat(1.0 - CROSSING) * limit;
+        let is_within = (start.abs().fast_max(last.abs()) + varies).simd_lt(within);
+        let torque = of(&state.torque);
+        let pushes = (start - torque).abs() + varies;
+        let is_without = match regime {
+            Regime::Sliding => is_within & slides(pushes),
+            Regime::Stuck => {
+                let pushed = (torque - of(&state.bed_accel)).abs() + pushes + bed_varies;
+                is_within & (f64x4::splat(model.step_s) * pushed).simd_lt(of(&model.coulomb_step))
+            }
+            Regime::Saturated => {
+                let (sign, error) = (sign_of(start), of(&self.error));
+                let end_error = of(&end.command) - of(&end.velocity);
+                let error_varies = (end_error - error).abs() + jump;
+                let beyond = f64x4::splat(1.0 + CROSSING) * limit;
+                ((sign * start).fast_min(sign * last) - varies).simd_gt(beyond)
+                    & (sign * error).simd_gt(error_varies)
+                    & slides(f64x4::splat(2.0) * (sign * limit - torque).abs())
+            }
+        };
+        is_without.all()
     }
 }

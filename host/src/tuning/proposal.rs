@@ -10,10 +10,13 @@ use motion_kernel::units::DacCode;
 use super::error::TuningError;
 use super::feedforward::{Method, feedforward};
 use super::gains::{GAIN_MIN, NOISE_PART, PHASE_MIN_DEG, best, kd_max, scaled, written};
-use super::known::{Known, Origin};
+use super::known::{Known, Origin, is_damping_known};
 use super::margins::Margins;
 use crate::identify::{AxisParametersFound, BedEstimate, Estimate, Identification};
 use crate::machine::AxisSettings;
+
+/// Harmonic motion is at a resonance if its frequency is this near, as a part of it.
+const RESONANCE_NEAR: f64 = 0.05;
 
 /// A key of the machine file with its new value.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,12 +69,9 @@ pub fn propose(
     // Feedforward does nothing for what is not known. A loop has it all the same: what explains the recordings best.
     let (drive, looped) = (&known.drive, &parameters.drive());
     let gain = command_gain(parameters);
-    let limit = parameters.accel_limit_mm_s2;
-    let limit_mm_s2 = if limit.is_determined() { limit.value } else { axis.accel_mm_s2 };
-    let kd_max = kd_max(looped, tick_s, found.figures.reading_error_mm(), limit_mm_s2);
+    let gains =
+        regulator_gains(axis, found, tick_s).ok_or_else(|| TuningError::Lag { axis: axis.name.clone() })?;
     // The drive's velocity is `gain` times what the scale says, and so is the loop's gain.
-    let best = best(looped, tick_s, kd_max).ok_or_else(|| TuningError::Lag { axis: axis.name.clone() })?;
-    let gains = written(scaled(best, 1.0 / gain));
     let loop_gains = scaled(gains, gain);
     let margins = Margins::of(looped, loop_gains, tick_s);
     let drives = found.alternatives.drives.iter();
@@ -87,6 +87,7 @@ pub fn propose(
         changes: Vec::new(),
         remarks: remarks(axis, found),
     };
+    tuning.remarks.extend(unclear_damping(found, loop_gains, tick_s));
     let series = || feedforward(Method::Series, drive, gain, &loop_gains, tick_s);
     simplify(axis, &mut tuning, tick_s, series)?;
     if tuning.feedforward.drive.is_none() {
@@ -100,6 +101,32 @@ pub fn propose(
     }
     tuning.changes = changes(axis, &tuning, parameters, &known, method);
     Ok(tuning)
+}
+
+/// The gains that are proposed. `None` if nothing keeps margins.
+pub(super) fn regulator_gains(axis: &AxisSettings, found: &Identification, tick_s: f64) -> Option<Gains> {
+    let (parameters, drive) = (&found.parameters, &found.parameters.drive());
+    let limit = parameters.accel_limit_mm_s2;
+    let limit_mm_s2 = if limit.is_determined() { limit.value } else { axis.accel_mm_s2 };
+    let kd_max = kd_max(drive, tick_s, found.figures.reading_error_mm(), limit_mm_s2);
+    Some(written(scaled(best(drive, tick_s, kd_max)?, 1.0 / command_gain(parameters))))
+}
+
+/// What to say where margins hang on the damping of a bed, and no motion at its resonance was recorded.
+fn unclear_damping(found: &Identification, loop_gains: Gains, tick_s: f64) -> Option<String> {
+    let resonance_hz = found.parameters.bed?.resonance_hz();
+    let is_recorded = found
+        .figures
+        .harmonics
+        .iter()
+        .any(|run| (run.frequency_hz / resonance_hz - 1.0).abs() < RESONANCE_NEAR);
+    let is_known = is_damping_known(&found.parameters, loop_gains, tick_s);
+    (found.is_met() && !is_recorded && !is_known).then(|| {
+        format!(
+            "The margins hang on the damping of the bed, which the recordings do not tell well enough: some seconds on a \
+             circle at {resonance_hz:.1} Hz would."
+        )
+    })
 }
 
 /// Leaves out what the kernel would refuse, the bed first, and says so.
@@ -143,7 +170,7 @@ fn rounded_to(value: f64) -> f64 {
 }
 
 /// Actual over nominal scale; 1 where the recordings do not tell it from 1.
-fn command_gain(parameters: &AxisParametersFound) -> f64 {
+pub(super) fn command_gain(parameters: &AxisParametersFound) -> f64 {
     let gain = parameters.command_gain;
     let is_told = (gain.value - 1.0).abs() > gain.half_width_95.max(1e-3);
     if is_told && gain.value > 0.0 { gain.value } else { 1.0 }
@@ -441,7 +468,7 @@ mod tests {
                 harmonic_hz,
             })
         };
-        identify(&explore(TICK_S, 333.0, run).expect("runs")).expect("an identification")
+        identify(&explore(333.0, run).expect("runs")).expect("an identification")
     }
 
     /// What everything depends on has to be known; what the rest is not known to be stays, as far as the
