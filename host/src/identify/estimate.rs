@@ -60,13 +60,6 @@ impl BedEstimate {
     pub fn resonance_hz(&self) -> f64 {
         self.frequency_hz.value / (1.0 + self.mass_ratio.value).sqrt()
     }
-
-    /// The time in which it then decays by e: (1 + mass ratio)/(damping ratio · 2π · frequency) \[s\].
-    #[must_use]
-    pub fn decay_s(&self) -> f64 {
-        let omega_per_s = core::f64::consts::TAU * self.frequency_hz.value;
-        (1.0 + self.mass_ratio.value) / (self.damping_ratio.value * omega_per_s)
-    }
 }
 
 /// Parameters of a servo axis, of the model in [`DriveParameters`].

@@ -7,7 +7,6 @@
 use core::f64::consts::PI;
 
 use super::differences::Parabolas;
-use super::estimate::BedEstimate;
 use super::recording::AxisRecording;
 
 /// The part of what an axis reaches that it may take: drift and trim need some of the output, too.
@@ -35,9 +34,8 @@ const HARMONIC_ACCEL: f64 = 0.4;
 /// The slow ones' velocity, over the steps'.
 const SLOW_SHARE: f64 = 0.15;
 
-/// Harmonic motion at the resonance of a bed, over the time in which that decays by e, and its greatest length \[s\].
-const DECAYS: f64 = 2.0;
-const AT_RESONANCE_S_MAX: f64 = 4.0;
+/// Time of long harmonic motion \[s\]. A bed of 5 Hz and a damping of 0.005 takes 6 s to build up by all but a third.
+const LONG_S: f64 = 4.0;
 
 /// Ticks of the shortest period.
 const PERIOD_TICKS_MIN: f64 = 10.0;
@@ -129,18 +127,15 @@ pub fn identification_plan(reach: &Reach) -> Vec<Excitation> {
     steps.chain(slow).chain(fast.map(|hz| harmonic(hz, 0.5 * step_mm_s))).collect()
 }
 
-/// Harmonic motion at the resonance of a bed, until it has built up. The plan's runs are too short for a bed that decays slowly: how
-/// high it builds up tells its damping. The axis is asked for no more than in the plan, but a bed that pushes back brings the drive
-/// to its current limit, as steps do. With less motion it would be told no better than by the plan. `None` above the highest
-/// frequency of the plan.
+/// Harmonic motion that shows how the axis answers at a frequency, resonances with little damping included. The axis is asked for
+/// no more than in the plan, but a bed that has built up pushes back, and may bring the drive to its current limit, as steps do.
+/// `None` for frequencies that are not above 0, or above the highest of the plan.
 #[must_use]
-pub fn at_resonance(reach: &Reach, bed: &BedEstimate) -> Option<Excitation> {
-    let frequency_hz = bed.resonance_hz();
-    let time_s = (DECAYS * bed.decay_s()).clamp(HARMONIC_S, AT_RESONANCE_S_MAX);
-    (frequency_hz <= reach.highest_hz()).then(|| Excitation::Harmonic {
+pub fn long_harmonic(reach: &Reach, frequency_hz: f64) -> Option<Excitation> {
+    (frequency_hz > 0.0 && frequency_hz <= reach.highest_hz()).then(|| Excitation::Harmonic {
         amplitude_mm_s: reach.harmonic_mm_s(frequency_hz).min(0.5 * reach.step_mm_s()),
         frequency_hz,
-        periods: (time_s * frequency_hz).round().max(PERIODS.0) as u32,
+        periods: (LONG_S * frequency_hz).round().max(PERIODS.0) as u32,
     })
 }
 
@@ -252,32 +247,23 @@ mod tests {
         assert!((greatest_mm_s(1000.0) - 159.15).abs() < 1e-9);
     }
 
-    /// A bed that decays in 0.52 s, one that does in 6.8 s, and one that does at once.
     #[test]
-    fn a_bed_builds_up_at_its_resonance() {
+    fn long_motion_asks_for_no_more_than_the_plan() {
         let reach = Reach { tick_s: 0.5e-3, fastest_mm_s: 333.0, accel_mm_s2: 12_300.0 };
-        let of = |value: f64| crate::identify::Estimate { value, half_width_95: 0.0 };
-        let bed = |frequency_hz: f64, damping_ratio: f64, mass_ratio: f64| BedEstimate {
-            frequency_hz: of(frequency_hz),
-            damping_ratio: of(damping_ratio),
-            mass_ratio: of(mass_ratio),
-        };
-        for (bed, resonance_hz, time_s) in [
-            (bed(60.0, 0.0064, 0.25), 53.666, 1.04),
-            (bed(5.2, 0.0054, 0.2), 4.747, 4.0),
-            (bed(20.0, 0.1, 0.1), 19.069, 0.45),
-        ] {
+        for hz in [0.3, 4.7, 53.7, 200.0] {
             let Some(Excitation::Harmonic { amplitude_mm_s, frequency_hz, periods }) =
-                at_resonance(&reach, &bed)
+                long_harmonic(&reach, hz)
             else {
                 panic!("no harmonic motion");
             };
-            assert!((frequency_hz - resonance_hz).abs() < 1e-3, "{frequency_hz} Hz");
-            assert!((f64::from(periods) / frequency_hz - time_s).abs() < 0.6 / frequency_hz, "{periods}");
-            let accel_mm_s2 = amplitude_mm_s * 2.0 * PI * frequency_hz;
+            assert!((frequency_hz - hz).abs() < 1e-12);
+            assert!(f64::from(periods) >= 4.0 && (f64::from(periods) / hz - 4.0).abs() < 10.0, "{periods}");
+            let accel_mm_s2 = amplitude_mm_s * 2.0 * PI * hz;
             assert!(accel_mm_s2 <= 0.4 * 12_300.0 + 1e-6 && amplitude_mm_s <= 79.6, "{amplitude_mm_s} mm/s");
         }
-        assert_eq!(at_resonance(&reach, &bed(230.0, 0.01, 0.1)), None);
+        for hz in [0.0, -1.0, 201.0, f64::NAN, f64::INFINITY] {
+            assert_eq!(long_harmonic(&reach, hz), None);
+        }
     }
 
     /// Steps saturate a drive for 0.15 s at most, and harmonic motion never does.

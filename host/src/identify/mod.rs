@@ -1,6 +1,6 @@
 //! Identification: the parameters of a servo axis, from recordings of outputs and encoder readings.
 //!
-//! Consumes [`AxisRecording`]s of the motions that [`explore`] and [`at_resonance`] ask for, or of any others that start at rest, from an
+//! Consumes [`AxisRecording`]s of the motions that [`explore`] and [`long_harmonic`] ask for, or of any others that start at rest, from an
 //! open or a closed loop; produces an [`Identification`]. Runs in the background of the PC, mostly in two seconds of processor
 //! time for ten seconds of recordings; `docs/DRIVES.md` has the longest. It never sees the parameters of a simulation: a machine gives the
 //! same two columns.
@@ -78,7 +78,7 @@ pub use error::IdentifyError;
 pub use estimate::{
     Alternatives, AxisParametersFound, BedEstimate, DETERMINED, Estimate, Figures, Identification, RunMatch,
 };
-pub use excitation::{Excitation, Reach, at_resonance, explore, first_look, identification_plan};
+pub use excitation::{Excitation, Reach, explore, first_look, identification_plan, long_harmonic};
 pub use harmonic_reading::{Bandwidth, HarmonicReading};
 pub use recording::AxisRecording;
 pub use screw::{

@@ -1,19 +1,17 @@
 //! What to record of an axis that is to be tuned.
 //!
-//! [`explore`]'s runs show every parameter. None of them lasts until a bed of little damping has built up its motion, but the gain
-//! margin of a loop hangs on how high it builds up. Where the recordings leave more of the margins open than
-//! [`MARGINS_KNOWN`](super::known::MARGINS_KNOWN), the axis is moved at the bed's resonance, too.
+//! [`explore`]'s runs show every parameter. But a bed of little damping builds up for longer than any of them lasts, and how high it
+//! builds up may decide the margins of a loop. Where a margin is not known well, an axis on a bed is moved for some seconds at the
+//! frequency at which it is read, too. Of a rigid axis that would tell nothing new.
 
 use std::thread;
 
-use super::gains::scaled;
-use super::known::is_damping_known;
-use super::proposal::{command_gain, regulator_gains};
+use super::position_loop::PositionLoop;
 use crate::drive::DriveError;
 use crate::drive::identification::{reach_mm_s, recording};
 use crate::identify::{
-    AxisRecording, Excitation, Identification, IdentifyError, Reach, at_resonance, explore, identify,
-    identify_further,
+    AxisRecording, Excitation, Identification, IdentifyError, Reach, explore, identify, identify_further,
+    long_harmonic,
 };
 use crate::machine::{AxisSettings, Machine};
 
@@ -57,18 +55,23 @@ pub fn identify_to_tune<E>(
         Ok(found) => found,
         Err(error) => return Ok(Err(error)),
     };
-    if let Some(excitation) = missing(axis, &found, &Reach::seen(&runs[0], fastest_mm_s), tick_s) {
-        runs.push(record(&excitation)?);
-        // What all runs together don't tell, the first ones did.
-        return Ok(Ok(identify_further(&found, &runs).unwrap_or(found)));
+    let reach = Reach::seen(&runs[0], fastest_mm_s);
+    let missing = missing(axis, &found, &reach, tick_s);
+    if missing.is_empty() {
+        return Ok(Ok(found));
     }
-    Ok(Ok(found))
+    for excitation in &missing {
+        runs.push(record(excitation)?);
+    }
+    // What all runs together don't tell, the first ones did.
+    Ok(Ok(identify_further(&found, &runs).unwrap_or(found)))
 }
 
-/// The motion that tells margins better, if they are not known well.
-fn missing(axis: &AxisSettings, found: &Identification, reach: &Reach, tick_s: f64) -> Option<Excitation> {
-    let parameters = &found.parameters;
-    let (bed, gains) = (parameters.bed?, regulator_gains(axis, found, tick_s)?);
-    let is_known = is_damping_known(parameters, scaled(gains, command_gain(parameters)), tick_s);
-    if found.is_met() && !is_known { at_resonance(reach, &bed) } else { None }
+/// The motions that tell the margins of an axis on a bed better, where they are not known well.
+fn missing(axis: &AxisSettings, found: &Identification, reach: &Reach, tick_s: f64) -> Vec<Excitation> {
+    if found.parameters.bed.is_none() || !found.is_met() {
+        return Vec::new();
+    }
+    let unclear_hz = PositionLoop::new(axis, found, tick_s).map_or_else(Vec::new, |one| one.unclear_hz());
+    unclear_hz.into_iter().filter_map(|hz| long_harmonic(reach, hz)).collect()
 }

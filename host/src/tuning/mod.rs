@@ -18,6 +18,7 @@ pub mod feedforward;
 pub mod gains;
 pub mod known;
 pub mod margins;
+mod position_loop;
 pub mod proposal;
 
 pub use error::TuningError;
