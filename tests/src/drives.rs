@@ -11,9 +11,11 @@ use motion_host::drive::DriveError;
 use motion_host::drive::circle::{CircleFigures, figures};
 use motion_host::drive::verification::{Verdict, bears_mm_s2, circle};
 use motion_host::gcode::Plane;
-use motion_host::identify::{AxisParametersFound, AxisRecording, Estimate, Excitation, Identification};
+use motion_host::identify::{
+    AxisParametersFound, AxisRecording, Estimate, Excitation, Identification, explore, identify,
+};
 use motion_host::machine::Machine;
-use motion_host::tuning::{AxisTuning, Margins, Method, identify_to_tune, propose};
+use motion_host::tuning::{AxisTuning, Margins, Method, propose};
 use motion_kernel::units::DacCode;
 
 use crate::random::Random;
@@ -195,7 +197,7 @@ pub struct Surveyed {
     pub margins: Option<[Compared; 2]>,
     /// Circles before and after tuning; none without a tuning.
     pub circles: Circles,
-    /// Time that it took without recording \[s\]: of the processor, where the system tells it.
+    /// Time that it took \[s\]: of the processor, where the system tells it.
     pub time_s: f64,
 }
 
@@ -273,18 +275,14 @@ pub struct Circles {
 pub fn surveyed(seed: u64, circles_hz: &[f64]) -> Surveyed {
     let axis = RandomAxis::new(seed);
     let mut run = 0;
-    let mut recording_s = 0.0;
-    let record = |excitation: &Excitation| {
+    let runs = explore(REFERENCE_TICK_S, FASTEST_MM_S, |excitation| {
         run += 1;
-        let start_s = processor_s();
-        let recording = axis.record(excitation, run);
-        recording_s += processor_s() - start_s;
-        Ok::<_, core::convert::Infallible>(recording)
-    };
+        Ok::<_, core::convert::Infallible>(axis.record(excitation, run))
+    });
+    let Ok(runs) = runs;
     let start_s = processor_s();
-    let settings = &machine(&axis).axes[0];
-    let Ok(found) = identify_to_tune(settings, REFERENCE_TICK_S, FASTEST_MM_S, record);
-    let time_s = processor_s() - start_s - recording_s;
+    let found = identify(&runs);
+    let time_s = processor_s() - start_s;
     let has_bed = found.as_ref().is_ok_and(|found| found.parameters.bed.is_some());
     let is_met = found.as_ref().is_ok_and(Identification::is_met);
     let tuned = found.as_ref().ok().and_then(|found| Some((found, tuning(&axis, found)?)));

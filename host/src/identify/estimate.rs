@@ -3,7 +3,6 @@
 use hal_sim::{BedMode, DriveParameters};
 
 use super::harmonic_reading::{Bandwidth, HarmonicReading};
-use super::parameters::Unknowns;
 use super::step_reading::StepReading;
 
 /// Half an interval over the value, up to which a value counts as determined.
@@ -190,8 +189,6 @@ pub struct Identification {
     pub parameters: AxisParametersFound,
     /// Other drives that the recordings allow.
     pub alternatives: Alternatives,
-    /// Where the search ended, and its rivals: for one with further recordings.
-    pub(super) ends: Vec<Unknowns>,
     /// The figures that need no model.
     pub figures: Figures,
     /// The residuals by run, in the order given.

@@ -34,9 +34,6 @@ const HARMONIC_ACCEL: f64 = 0.4;
 /// The slow ones' velocity, over the steps'.
 const SLOW_SHARE: f64 = 0.15;
 
-/// Time of long harmonic motion \[s\]. A bed of 5 Hz and a damping of 0.005 takes 6 s to build up by all but a third.
-const LONG_S: f64 = 4.0;
-
 /// Ticks of the shortest period.
 const PERIOD_TICKS_MIN: f64 = 10.0;
 
@@ -49,29 +46,6 @@ pub struct Reach {
     pub fastest_mm_s: f64,
     /// Acceleration \[mm/s²\], > 0: about what its drive gives it.
     pub accel_mm_s2: f64,
-}
-
-impl Reach {
-    /// That of an axis of which `first_look` was recorded.
-    #[must_use]
-    pub fn seen(first_look: &AxisRecording, fastest_mm_s: f64) -> Self {
-        Self { tick_s: first_look.tick_s, fastest_mm_s, accel_mm_s2: accel_mm_s2(first_look) }
-    }
-
-    /// The fastest step \[mm/s\].
-    fn step_mm_s(&self) -> f64 {
-        FASTEST_MM_S.min(REACH_SHARE * self.fastest_mm_s).min(RISE_S * self.accel_mm_s2)
-    }
-
-    /// The amplitude of harmonic motion \[mm/s\].
-    fn harmonic_mm_s(&self, frequency_hz: f64) -> f64 {
-        HARMONIC_ACCEL * self.accel_mm_s2 / (2.0 * PI * frequency_hz)
-    }
-
-    /// The highest frequency of harmonic motion \[Hz\].
-    fn highest_hz(&self) -> f64 {
-        1.0 / (PERIOD_TICKS_MIN * self.tick_s)
-    }
 }
 
 /// A motion of one axis about its starting point, as the commanded velocity over time.
@@ -110,33 +84,23 @@ pub fn first_look(fastest_mm_s: f64) -> Excitation {
 /// and harmonic motion stays within two fifths of it.
 #[must_use]
 pub fn identification_plan(reach: &Reach) -> Vec<Excitation> {
-    let step_mm_s = reach.step_mm_s();
+    let &Reach { tick_s, fastest_mm_s, accel_mm_s2 } = reach;
+    let step_mm_s = FASTEST_MM_S.min(REACH_SHARE * fastest_mm_s).min(RISE_S * accel_mm_s2);
     let steps = (0..STEPS).map(|step| {
         let feed_mm_s = step_mm_s / STEP_RATIO.powi(step);
-        let cruise_s = 0.2 + 1.5 * feed_mm_s / reach.accel_mm_s2;
+        let cruise_s = 0.2 + 1.5 * feed_mm_s / accel_mm_s2;
         Excitation::Steps { feed_mm_s, cruise_s, rest_s: 0.15 }
     });
     let harmonic = |frequency_hz: f64, most_mm_s: f64| Excitation::Harmonic {
-        amplitude_mm_s: reach.harmonic_mm_s(frequency_hz).min(most_mm_s),
+        amplitude_mm_s: (HARMONIC_ACCEL * accel_mm_s2 / (2.0 * PI * frequency_hz)).min(most_mm_s),
         frequency_hz,
         // Whole and small.
         periods: (HARMONIC_S * frequency_hz).round().clamp(PERIODS.0, PERIODS.1) as u32,
     };
     let slow = SLOW_HZ.into_iter().map(|hz| harmonic(hz, SLOW_SHARE * step_mm_s));
-    let fast = HARMONIC_HZ.into_iter().filter(|hz| *hz <= reach.highest_hz());
-    steps.chain(slow).chain(fast.map(|hz| harmonic(hz, 0.5 * step_mm_s))).collect()
-}
-
-/// Harmonic motion that shows how the axis answers at a frequency, resonances with little damping included. The axis is asked for
-/// no more than in the plan, but a bed that has built up pushes back, and may bring the drive to its current limit, as steps do.
-/// `None` for frequencies that are not above 0, or above the highest of the plan.
-#[must_use]
-pub fn long_harmonic(reach: &Reach, frequency_hz: f64) -> Option<Excitation> {
-    (frequency_hz > 0.0 && frequency_hz <= reach.highest_hz()).then(|| Excitation::Harmonic {
-        amplitude_mm_s: reach.harmonic_mm_s(frequency_hz).min(0.5 * reach.step_mm_s()),
-        frequency_hz,
-        periods: (LONG_S * frequency_hz).round().max(PERIODS.0) as u32,
-    })
+    let highest_hz = 1.0 / (PERIOD_TICKS_MIN * tick_s);
+    let fast = HARMONIC_HZ.into_iter().filter(|hz| *hz <= highest_hz).map(|hz| harmonic(hz, 0.5 * step_mm_s));
+    steps.chain(slow).chain(fast).collect()
 }
 
 /// Records an axis by `record`: a first look, and then what [`identification_plan`] asks of it.
@@ -144,11 +108,13 @@ pub fn long_harmonic(reach: &Reach, frequency_hz: f64) -> Option<Excitation> {
 /// # Errors
 /// Those of `record`.
 pub fn explore<E>(
+    tick_s: f64,
     fastest_mm_s: f64,
     mut record: impl FnMut(&Excitation) -> Result<AxisRecording, E>,
 ) -> Result<Vec<AxisRecording>, E> {
     let mut runs = vec![record(&first_look(fastest_mm_s))?];
-    for excitation in identification_plan(&Reach::seen(&runs[0], fastest_mm_s)) {
+    let accel_mm_s2 = accel_mm_s2(&runs[0]);
+    for excitation in identification_plan(&Reach { tick_s, fastest_mm_s, accel_mm_s2 }) {
         runs.push(record(&excitation)?);
     }
     Ok(runs)
@@ -245,25 +211,6 @@ mod tests {
             assert!((greatest_mm_s(fastest_mm_s) - REACH_SHARE * fastest_mm_s).abs() < 1e-9);
         }
         assert!((greatest_mm_s(1000.0) - 159.15).abs() < 1e-9);
-    }
-
-    #[test]
-    fn long_motion_asks_for_no_more_than_the_plan() {
-        let reach = Reach { tick_s: 0.5e-3, fastest_mm_s: 333.0, accel_mm_s2: 12_300.0 };
-        for hz in [0.3, 4.7, 53.7, 200.0] {
-            let Some(Excitation::Harmonic { amplitude_mm_s, frequency_hz, periods }) =
-                long_harmonic(&reach, hz)
-            else {
-                panic!("no harmonic motion");
-            };
-            assert!((frequency_hz - hz).abs() < 1e-12);
-            assert!(f64::from(periods) >= 4.0 && (f64::from(periods) / hz - 4.0).abs() < 10.0, "{periods}");
-            let accel_mm_s2 = amplitude_mm_s * 2.0 * PI * hz;
-            assert!(accel_mm_s2 <= 0.4 * 12_300.0 + 1e-6 && amplitude_mm_s <= 79.6, "{amplitude_mm_s} mm/s");
-        }
-        for hz in [0.0, -1.0, 201.0, f64::NAN, f64::INFINITY] {
-            assert_eq!(long_harmonic(&reach, hz), None);
-        }
     }
 
     /// Steps saturate a drive for 0.15 s at most, and harmonic motion never does.

@@ -55,8 +55,6 @@ const MISS_MAX: f64 = 0.05;
 pub(super) struct Fit {
     pub(super) parameters: AxisParametersFound,
     pub(super) alternatives: Alternatives,
-    /// What was found, and its rivals.
-    pub(super) ends: Vec<Unknowns>,
     pub(super) runs: Vec<RunMatch>,
     pub(super) misfit_per_reading: f64,
 }
@@ -69,18 +67,6 @@ pub(super) fn fit(recordings: &[AxisRecording], resolution_mm: f64) -> Result<Fi
     let starts = coarse(recordings, resolution_mm)?;
     let model = search.best(&starts).ok_or(too_late.clone())?;
     concluded(recordings, search.runs, &model).ok_or(too_late)?
-}
-
-/// Fits the model from the `ends` of an earlier fit on: what was found, and its rivals. `None` if it does not follow all recordings
-/// from there.
-pub(super) fn refit(recordings: &[AxisRecording], resolution_mm: f64, ends: &[Unknowns]) -> Option<Fit> {
-    let (&start, rivals) = ends.split_first()?;
-    let mut runs = Runs::new(recordings, resolution_mm);
-    runs.regroup(&start, SUBSTEPS);
-    let stages = Stages { runs, accel_mm_s2: sustained_accel_mm_s2(recordings) };
-    let model = stages.again(start, rivals)?;
-    let is_followed = model.found.misfit() < FOLLOWED_WELL * stages.readings();
-    if is_followed { concluded(recordings, stages.runs, &model)?.ok() } else { None }
 }
 
 /// A model that was found.
@@ -143,20 +129,6 @@ impl Stages {
         Some(match other {
             Some(other) => self.better(before, other),
             None => before,
-        })
-    }
-
-    /// From an earlier end: the same with readings that it was not made of. A bed has to explain enough of them, too.
-    fn again(&self, start: Unknowns, rivals: &[Unknowns]) -> Option<Model> {
-        let has_bed = start.get(Unknown::BedMassRatio) > 0.0;
-        let free = if has_bed { &ALL } else { without_bed() };
-        let found = Found { rivals: rivals.to_vec(), ..search(&self.runs, start, free, LAST_EFFORT)? };
-        if !has_bed {
-            return Some(Model::rigid(found));
-        }
-        Some(match self.rigid_from(&found) {
-            Some(rigid) => self.with_or_without(rigid, Some(found)),
-            None => Model::with_bed(found),
         })
     }
 
@@ -340,7 +312,6 @@ fn concluded(
     Some(Ok(Fit {
         parameters: estimates(&confidence, &found, tick_s),
         alternatives: confidence.alternatives(),
-        ends: [found.unknowns].into_iter().chain(found.rivals.iter().copied()).collect(),
         runs: matches,
         misfit_per_reading: misfit / readings,
     }))

@@ -431,3 +431,23 @@ pub(super) fn dot(left: &[f64], right: &[f64]) -> f64 {
     let rest: f64 = left_rest.iter().zip(right_rest).map(|(left, right)| left * right).sum();
     sums.iter().sum::<f64>() + rest
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whole numbers: every order of summation is exact.
+    #[test]
+    fn products_are_those_of_the_shorter() {
+        let values: Vec<f64> = (1..=40).map(f64::from).collect();
+        for (left, right) in [(0, 5), (7, 7), (8, 8), (15, 17), (20, 15), (33, 40), (40, 40)] {
+            let expected: u32 = (1..=left.min(right) as u32).map(|value| value * (41 - value)).sum();
+            let back: Vec<f64> = values.iter().rev().copied().collect();
+            let found = dot(&values[..left], &back[..right]);
+            assert!(
+                (found - f64::from(expected)).abs() < 0.5,
+                "{left} and {right}: {found}, expected {expected}"
+            );
+        }
+    }
+}
