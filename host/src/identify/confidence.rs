@@ -19,7 +19,7 @@
 
 use super::bed::unseen_beds;
 use super::cholesky::{Lower, Symmetric};
-use super::parameters::{Unknown, Unknowns, way};
+use super::parameters::{ALL, Unknown, Unknowns, way};
 use super::readings::{Precision, Residuals, Runs, Weights, dot};
 use super::search::{Found, derivatives};
 use super::simulation::SUBSTEPS;
@@ -102,6 +102,13 @@ struct Place<'a> {
     factor: Lower,
 }
 
+/// A bed beside a rigid model, which recordings do not tell from chance, but which was searched for.
+pub(super) struct UnprovenBed {
+    pub(super) unknowns: Unknowns,
+    /// Logarithm of its likelihood over that of the rigid model, by Schwarz.
+    pub(super) log_likelihood: f64,
+}
+
 impl<'a> Place<'a> {
     fn new(centre: Unknowns, free: &'a [Unknown], misfit: f64, information: Symmetric) -> Option<Self> {
         let factor = inverse_factor(&information)?;
@@ -150,7 +157,13 @@ impl<'a> Place<'a> {
 
 /// The confidence of what a search over the `free` unknowns found, with weights that are up to date; `None` if it
 /// can't be linearised.
-pub(super) fn confidence(runs: &mut Runs, found: &Found, free: &[Unknown], left: f64) -> Option<Confidence> {
+pub(super) fn confidence(
+    runs: &mut Runs,
+    found: &Found,
+    free: &[Unknown],
+    unproven: Option<&UnprovenBed>,
+    left: f64,
+) -> Option<Confidence> {
     let whitened = runs.weights(Precision::LAST).whitened(&found.residuals);
     let factors: Vec<f64> = whitened.iter().map(|run| correlation_factor(run)).collect();
     // A remainder that counts as a whole counts once.
@@ -162,20 +175,21 @@ pub(super) fn confidence(runs: &mut Runs, found: &Found, free: &[Unknown], left:
     runs.scale_variances(&counted);
     let weights = runs.weights(Precision::LAST);
     let lag_limit_s = runs.lag_limit_s();
-    let place = |centre: &Unknowns| Place::linearised(runs, &weights, *centre, free);
-    let (first, columns, still) = place(&found.unknowns)?;
+    let place = |centre: &Unknowns, free| Place::linearised(runs, &weights, *centre, free);
+    let (first, columns, still) = place(&found.unknowns, free)?;
     let mut places = vec![(first, 0.0)];
     for rival in &found.rivals {
         if places.iter().any(|(place, _)| place.is_at(rival)) {
             continue;
         }
         // A rival that can't be linearised is none.
-        let rival = place(rival);
+        let rival = place(rival, free);
         places.extend(rival.map(|(rival, ..)| {
             let log_likelihood = rival.log_likelihood(&places[0].0);
             (rival, log_likelihood)
         }));
     }
+    places.extend(unproven.and_then(|bed| Some((place(&bed.unknowns, &ALL)?.0, bed.log_likelihood))));
     let mut chance = Chance(0x1DE7);
     let mut samples = samples(&places, &mut chance, lag_limit_s);
     // Beside a remainder, likelihoods mean nothing.
@@ -381,7 +395,7 @@ impl Confidence {
 #[cfg(test)]
 mod tests {
     use super::super::fixtures::{harmonic, recorded, sticking};
-    use super::super::parameters::{ALL, without_bed};
+    use super::super::parameters::without_bed;
     use super::*;
 
     #[test]
@@ -425,7 +439,7 @@ mod tests {
         let (runs, found) = quiet();
         let free = [Unknown::Gain, Unknown::Offset, Unknown::Lag];
         let half_width = |left: f64| {
-            let confidence = confidence(&mut runs.clone(), &found, &free, left).expect("a confidence");
+            let confidence = confidence(&mut runs.clone(), &found, &free, None, left).expect("a confidence");
             confidence.estimate(|unknowns| unknowns.get(Unknown::Gain)).half_width_95
         };
         let part = half_width(0.0) / half_width(f64::MIN_POSITIVE);
@@ -438,6 +452,25 @@ mod tests {
         let residuals = runs.residuals(&[unknowns], SUBSTEPS).remove(0).expect("numbers");
         let misfits = runs.weights(Precision::LAST).misfits(&residuals);
         (runs, Found { unknowns, residuals, misfits, rivals: Vec::new() })
+    }
+
+    #[test]
+    fn intervals_span_a_bed_that_is_not_proven() {
+        let (runs, found) = quiet();
+        let gain = found.unknowns.get(Unknown::VelocityGain);
+        let half_width = |log_likelihood: Option<f64>| {
+            let unknowns = found.unknowns.shifted(Unknown::VelocityGain, 0.05);
+            let bed = log_likelihood.map(|log_likelihood| UnprovenBed { unknowns, log_likelihood });
+            let confidence = confidence(&mut runs.clone(), &found, without_bed(), bed.as_ref(), 0.0);
+            confidence
+                .expect("a confidence")
+                .estimate(|unknowns| unknowns.get(Unknown::VelocityGain))
+                .half_width_95
+        };
+        let alone = half_width(None);
+        assert!(alone < 0.04 * gain, "{alone}");
+        assert!(half_width(Some(0.0)) > 0.05 * gain);
+        assert!((half_width(Some(-9.0)) / alone - 1.0).abs() < 0.01);
     }
 
     /// As likely in all as what was found, a fifth as likely, and e⁵⁰⁰⁰ times as likely.
@@ -475,8 +508,9 @@ mod tests {
         let residuals = runs.residuals(&[rigid], SUBSTEPS).remove(0).expect("numbers");
         let misfits = runs.weights(Precision::LAST).misfits(&residuals);
         let found = Found { unknowns: rigid, residuals, misfits, rivals: Vec::new() };
-        let confidence =
-            |left: f64| confidence(&mut runs.clone(), &found, without_bed(), left).expect("a confidence");
+        let confidence = |left: f64| {
+            confidence(&mut runs.clone(), &found, without_bed(), None, left).expect("a confidence")
+        };
         let beds = |confidence: &Confidence| {
             confidence.samples.iter().filter(|sample| sample.get(Unknown::BedMassRatio) > 0.0).count()
         };
