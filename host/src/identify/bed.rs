@@ -63,13 +63,17 @@ pub(super) fn unseen_beds(
     still: &Residuals,
 ) -> Vec<(Unknowns, f64)> {
     let tried = tried_beds(runs, weights, rigid, columns, still, Precision::LAST.substeps);
-    let ratio =
-        |index: usize| LEAST_RATIO * libm::pow(MOST_RATIO / LEAST_RATIO, index as f64 / (RATIOS - 1) as f64);
+    let ratio = |index: usize| spaced(LEAST_RATIO, MOST_RATIO, RATIOS, index);
     let log_share = -libm::log((TRIED * RATIOS) as f64);
     let of = |bed: &TriedBed, mass_ratio: f64| {
         bed.compensated(mass_ratio).map(|drive| (drive, log_share - 0.5 * bed.rise(mass_ratio)))
     };
     tried.iter().flat_map(|bed| (0..RATIOS).filter_map(move |index| of(bed, ratio(index)))).collect()
+}
+
+/// One of `count` values, equally spaced in their logarithm.
+fn spaced(least: f64, most: f64, count: usize, index: usize) -> f64 {
+    least * libm::pow(most / least, index as f64 / (count - 1) as f64)
 }
 
 /// A bed beside a rigid model. All that changes is in proportion to its mass ratio, over the tried one.
@@ -134,9 +138,7 @@ fn tried_beds(
     substeps: u32,
 ) -> Vec<TriedBed> {
     let known = columns.len();
-    let frequencies_hz =
-        (0..TRIED).map(|index| LEAST_HZ * libm::pow(MOST_HZ / LEAST_HZ, index as f64 / (TRIED - 1) as f64));
-    let frequencies_hz: Vec<f64> = frequencies_hz.collect();
+    let frequencies_hz: Vec<f64> = (0..TRIED).map(|index| spaced(LEAST_HZ, MOST_HZ, TRIED, index)).collect();
     let sets: Vec<Unknowns> = frequencies_hz.iter().map(|hz| beside(rigid, *hz, TRIED_MASS_RATIO)).collect();
     let mut tried_hz = Vec::with_capacity(TRIED);
     for (residuals, frequency_hz) in runs.residuals(&sets, substeps).into_iter().zip(frequencies_hz) {

@@ -139,7 +139,7 @@ pub(super) fn search(runs: &Runs, start: Unknowns, free: &[Unknown], effort: Eff
     let Effort { precision, jacobians, least_gain, differences } = effort;
     let mut is_central = differences == Differences::Central;
     let weights = runs.weights(precision);
-    let readings = runs.readings();
+    let (readings, lag_limit_s) = (runs.readings(), runs.lag_limit_s());
     let mut damping = 1e-3;
     let mut found: Option<Found> = None;
     for _ in 0..jacobians {
@@ -158,7 +158,8 @@ pub(super) fn search(runs: &Runs, start: Unknowns, free: &[Unknown], effort: Eff
             let tried: Vec<Unknowns> = dampings
                 .iter()
                 .map(|damping| {
-                    step(&normal, &gradient, &from, free, *damping, runs.lag_limit_s()).unwrap_or(from)
+                    let steps = damped(&normal, &gradient, &from, free, *damping, lag_limit_s);
+                    steps.map_or(from, |steps| from.moved(free, &steps, lag_limit_s))
                 })
                 .collect();
             let results = runs.residuals(&tried, precision.substeps);
@@ -190,19 +191,6 @@ pub(super) fn search(runs: &Runs, start: Unknowns, free: &[Unknown], effort: Eff
         damping = damping.clamp(1e-8, 1.0);
     }
     found
-}
-
-/// The unknowns after a damped step.
-fn step(
-    normal: &Symmetric,
-    gradient: &[f64],
-    unknowns: &Unknowns,
-    free: &[Unknown],
-    damping: f64,
-    lag_limit_s: f64,
-) -> Option<Unknowns> {
-    let steps = damped(normal, gradient, unknowns, free, damping, lag_limit_s)?;
-    Some(unknowns.moved(free, &steps, lag_limit_s))
 }
 
 /// −(JᵀJ + damping·diag)⁻¹·Jᵀr; 0 for unknowns that nothing shows, and for those at a bound that they would cross.
