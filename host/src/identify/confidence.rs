@@ -21,7 +21,7 @@ use super::bed::unseen_beds;
 use super::cholesky::{Lower, Symmetric};
 use super::parameters::{ALL, Unknown, Unknowns, way};
 use super::readings::{Precision, Residuals, Runs, Weights, dot};
-use super::search::{Found, derivatives};
+use super::search::{Found, STAIRS, derivatives};
 use super::simulation::SUBSTEPS;
 use super::{Alternatives, Estimate};
 use crate::chance::Chance;
@@ -138,11 +138,12 @@ impl<'a> Place<'a> {
         self.information.quadratic_form(&way(self.free, &self.centre, other)) < ONE_PLACE
     }
 
-    /// The logarithm of its likelihood over that of another place with as many unknowns, by Laplace: a wide valley counts
-    /// for more.
+    /// The logarithm of its likelihood over that of another place with as many unknowns, by Laplace: a wide valley counts for
+    /// more. An end that is worse counts for less by what is beyond the scatter of searches.
     fn log_likelihood(&self, other: &Place) -> f64 {
         let wider = self.factor.log_determinant() - other.factor.log_determinant();
-        wider - 0.5 * (self.misfit - other.misfit)
+        let worse = self.misfit - other.misfit;
+        wider - 0.5 * (worse.min(0.0) + (worse - STAIRS).max(0.0))
     }
 
     /// A sample about `centre`, which is its own or that of another place of its width.
@@ -535,8 +536,10 @@ mod tests {
         const FREE: [Unknown; 1] = [Unknown::Offset];
         let first = || place(&FREE, 0.0, 0.1, 100.0);
         let log = |other: Place| other.log_likelihood(&first());
-        assert!((log(place(&FREE, 10.0, 0.1, 104.0)) + 2.0).abs() < 1e-9);
-        assert!((log(place(&FREE, 10.0, 0.4, 104.0)) - 4.0_f64.ln() + 2.0).abs() < 1e-9);
+        assert!((log(place(&FREE, 10.0, 0.1, 104.0 + STAIRS)) + 2.0).abs() < 1e-9);
+        assert!((log(place(&FREE, 10.0, 0.4, 104.0 + STAIRS)) - 4.0_f64.ln() + 2.0).abs() < 1e-9);
+        assert!(log(place(&FREE, 10.0, 0.1, 100.0 + 0.9 * STAIRS)).abs() < 1e-9);
+        assert!((log(place(&FREE, 10.0, 0.1, 96.0)) - 2.0).abs() < 1e-9);
         // Samples of both places, which are far apart.
         let counts = |log_likelihood: f64| {
             let places = [(first(), 0.0), (place(&ALL, 10.0, 0.1, 90.0), log_likelihood)];

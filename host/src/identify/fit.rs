@@ -10,7 +10,7 @@ use super::confidence::{Confidence, UnprovenBed, confidence};
 use super::parameters::{ALL, Unknown, Unknowns, without_bed};
 use super::readings::{Precision, Runs};
 use super::recording::{AxisRecording, span};
-use super::search::{Effort, Found, LAST_EFFORT, is_met, least, search};
+use super::search::{Effort, Found, LAST_EFFORT, STAIRS, is_met, least, search};
 use super::simulation::SUBSTEPS;
 use super::valleys::{EXCHANGED_EFFORT, NEAR, SETTLING_EFFORT, UNDECIDED, finished, settled};
 use super::{Alternatives, AxisParametersFound, BedEstimate, Estimate, IdentifyError, RunMatch};
@@ -45,9 +45,6 @@ const SAME_FREQUENCY: f64 = 0.2;
 /// A bed must lower the misfit by what its unknowns are worth by themselves, and by 12 more: chance gives two unknowns as much in
 /// one of e⁶ cases.
 const BED_GAIN: f64 = 12.0;
-
-/// Two searches for one minimum end this far apart: positions are stairs where the limit acts, if low ones.
-const STAIRS: f64 = 10.0;
 
 /// Root mean square of the residuals over the travel, above which the model is none.
 const MISS_MAX: f64 = 0.05;

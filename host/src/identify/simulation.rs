@@ -147,7 +147,7 @@ impl Model {
         }
     }
 
-    /// One sub-step with the `delayed` commands; whether the first lane's integrator stopped or went on.
+    /// One sub-step with the `delayed` commands; whether the first lane's integrator stopped, went on or ran for a part.
     #[inline(always)]
     fn step(&self, state: &mut State, delayed: &Lane) -> bool {
         let (error, demand) = self.ask(state, delayed);
@@ -163,7 +163,9 @@ impl Model {
             }
         }
         let is_frozen = runs[0] < 0.5;
-        let is_moment = is_frozen != state.is_frozen;
+        // A limit that is just reached stops the drive's integrator for a sub-step, or not at all.
+        let is_part = runs[0] > 0.0 && runs[0] < 1.0;
+        let is_moment = is_part || is_frozen != state.is_frozen;
         state.is_frozen = is_frozen;
         state.demand = demand;
         // Loops, as closures over lanes are not inlined everywhere.
@@ -235,7 +237,7 @@ impl Simulation {
     }
 
     /// Drives an axis that starts at rest at 0; `each` has the state at the start of every tick, and may change it. Returns the
-    /// ticks in which the first set's current limit stops or frees the integrator.
+    /// ticks in which the first set's current limit stops or frees the integrator, or may.
     pub(super) fn run(&self, command_mm_s: &[f64], each: &mut dyn FnMut(usize, &mut State)) -> Vec<usize> {
         let Self { model, whole_ticks, substeps, .. } = self;
         let mut state = State::default();
