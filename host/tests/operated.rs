@@ -11,7 +11,7 @@ use motion_host::machine::Machine;
 use motion_kernel::link::State;
 
 /// Longer than anything here takes on a slow computer.
-const LONGEST: Duration = Duration::from_secs(120);
+const LONGEST: Duration = Duration::from_secs(300);
 
 const SQUARE: &str = "G21 G90 G61\nG1 X20 F3000\nY20\n(half)\nM0\nX0\nY0\nM2\n";
 

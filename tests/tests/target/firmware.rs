@@ -68,7 +68,7 @@ fn printed(tools: &Tools) -> Result<&'static [String], String> {
 pub(crate) fn emulator(image: &Path, serial: &str, monitor: &str, shift: u32) -> Command {
     let mut emulator = Command::new("timeout");
     emulator
-        .args(["600", "qemu-system-arm", "-M", "netduinoplus2", "-display", "none", "-monitor", monitor])
+        .args(["1800", "qemu-system-arm", "-M", "netduinoplus2", "-display", "none", "-monitor", monitor])
         .args(["-serial", "null", "-serial", serial, "-semihosting-config", "enable=on,target=native"])
         .args(["-icount", &format!("shift={shift},sleep=off"), "-kernel"])
         .arg(image);

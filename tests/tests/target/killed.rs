@@ -33,7 +33,7 @@ const STACK_BYTES: usize = 16 << 20;
 /// Kills by all boards together, unless `MOTION_TEST_KILLS` tells another number.
 const KILLS: u64 = 50;
 /// Against hanging.
-const TIME_OUT: Duration = Duration::from_secs(120);
+const TIME_OUT: Duration = Duration::from_secs(900);
 /// Ends are exact, and told in decimals [mm].
 const END_MM: f64 = 1e-9;
 /// In between, offsets along pieces of some millimetres are of f32 [mm].

@@ -324,7 +324,7 @@ impl Tools {
         let mut command = Command::new("timeout");
         let emulator = if board.is_arm() { EMULATORS[0] } else { EMULATORS[1] };
         command
-            .args(["900", emulator, "-M", board.machine, "-bios", "none", "-nographic"])
+            .args(["1800", emulator, "-M", board.machine, "-bios", "none", "-nographic"])
             .args(["-monitor", "none", "-serial", serial])
             .args(["-semihosting-config", "enable=on,target=native"])
             .arg("-device")
