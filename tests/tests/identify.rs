@@ -356,16 +356,17 @@ fn recordings_of_no_servo_axis_are_refused() {
 /// Circles of the ten drives: what the published machine had its figures from, and above its bed.
 const CIRCLES_HZ: [f64; 2] = [4.0, 16.0];
 
-/// Ten drives of which everything varies, and eight that were found wrong. 1017 never reaches its current limit: the
+/// Ten drives of which everything varies, and eleven that were found wrong. 1017 never reaches its current limit: the
 /// direction in which filter, gain and current loop trade is flat there but for the drive's steps. The search for 76
 /// stops far from its end, along a floor that is curved. 245 is in a valley from which only another wrong one is seen. The
 /// bed of 255 gains little. The axis of 476 stops and starts again by itself. 521 had a bed that is not there: the rigid
 /// model had gone astray. Of 337 a wrong place was found twice, which hid the right one.
-/// The bed of 940 is not shown, but what is found is off for it.
+/// The bed of 940 is not shown, but what is found is off for it. A search for 157 stays where the current limit does not act. The
+/// drive of 811 just reaches its limit, once. The floor of 578 is so rough that a rival is worse by chance.
 /// `cargo bench -p motion-tests --bench identify -- 0 1000` surveys as many as one likes; `docs/DRIVES.md` is what it said.
 #[test]
 fn random_drives_are_found_and_tuned() {
-    let (mut driven, seeds) = (0, (0..10).chain([76, 245, 255, 337, 476, 521, 940, 1017]));
+    let (mut driven, seeds) = (0, (0..10).chain([76, 157, 245, 255, 337, 476, 521, 578, 811, 940, 1017]));
     let circles = seeds.clone().count() * CIRCLES_HZ.len();
     for seed in seeds {
         let one = surveyed(seed, &CIRCLES_HZ);

@@ -111,7 +111,11 @@ impl Stages {
         let middle = self.stage(rough.unknowns, without_bed(), MIDDLE_EFFORT)?;
         let is_rigid = is_met(&self.runs, &middle);
         let model = if is_rigid { self.rigid_first(&middle) } else { self.bed_first(&middle) }?;
-        if model.found.misfit() < FOLLOWED_WELL * self.readings() {
+        if self.is_followed_well(&model) {
+            return Some(model);
+        }
+        let model = self.with_other_limit(model)?;
+        if self.is_followed_well(&model) {
             return Some(model);
         }
         let Some(bed) = self.other_beds(starts) else { return Some(model) };
@@ -125,6 +129,26 @@ impl Stages {
             Some(other) => self.better(before, other),
             None => before,
         })
+    }
+
+    fn is_followed_well(&self, model: &Model) -> bool {
+        model.found.misfit() < FOLLOWED_WELL * self.readings()
+    }
+
+    /// Where nothing follows: the same with each current limit that may act, if the other unknowns then explain more. At a limit that
+    /// does not act they make up for it, and no other limit is better without another search.
+    fn with_other_limit(&self, model: Model) -> Option<Model> {
+        let with = |part: f64| {
+            let mut start = model.found.unknowns;
+            start.set(Unknown::AccelLimit, part * self.accel_mm_s2);
+            search(&self.runs, start, model.free, EXCHANGED_EFFORT)
+        };
+        let best = least(TRIED_LIMITS.into_iter().filter_map(with));
+        let Some(best) = best.filter(|best| best.misfit() < model.found.misfit() - PROMISE) else {
+            return Some(model);
+        };
+        let best = search(&self.runs, best.unknowns, model.free, LAST_EFFORT)?;
+        Some(Model { found: finished(&self.runs, best, model.free)?, ..model })
     }
 
     /// The one that explains more; a bed has to explain enough.
