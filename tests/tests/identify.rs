@@ -362,7 +362,7 @@ const CIRCLES_HZ: [f64; 2] = [4.0, 16.0];
 /// bed of 255 gains little. The axis of 476 stops and starts again by itself. 521 had a bed that is not there: the rigid
 /// model had gone astray. Of 337 a wrong place was found twice, which hid the right one.
 /// The bed of 940 is not shown, but what is found is off for it. A search for 157 stays where the current limit does not act. The
-/// drive of 811 just reaches its limit, once. The floor of 578 is so rough that a rival is worse by chance.
+/// drive of 811 just reaches its limit, once. The floor of 578 is so rough that the right place is worse by chance.
 /// `cargo bench -p motion-tests --bench identify -- 0 1000` surveys as many as one likes; `docs/DRIVES.md` is what it said.
 #[test]
 fn random_drives_are_found_and_tuned() {

@@ -15,8 +15,8 @@ use super::simulation::SUBSTEPS;
 use super::valleys::{EXCHANGED_EFFORT, NEAR, SETTLING_EFFORT, UNDECIDED, finished, settled};
 use super::{Alternatives, AxisParametersFound, BedEstimate, Estimate, IdentifyError, RunMatch};
 
-/// Current limits that are tried over the greatest acceleration before every stage: above what the model asks for a
-/// limit does nothing, and a search that has gone there does not come back.
+/// Current limits that are tried over the greatest acceleration, before every stage and where the model does not follow well: above
+/// what the model asks for a limit does nothing, and a search that has gone there does not come back.
 const TRIED_LIMITS: [f64; 11] = [0.6, 0.7, 0.8, 0.87, 0.93, 1.0, 1.07, 1.15, 1.3, 1.6, 3.0];
 
 const ROUGH_EFFORT: Effort = Effort::far(Precision { substeps: 5, slack: 2e-3 }, 12);
@@ -27,7 +27,7 @@ const FINE_EFFORT: Effort = Effort::far(Precision { substeps: SUBSTEPS, slack: 5
 
 /// Beds that are followed.
 const BEDS: usize = 3;
-/// Gain in misfit from which a promised bed is searched for, and one that was found is finished.
+/// Gain in misfit from which a promised bed is searched for, one that was found is finished, and another current limit is followed.
 const PROMISE: f64 = 12.0;
 /// Misfit for each reading from which what was found may be a false minimum: that of a right model scatters by some
 /// hundredths.
@@ -114,16 +114,29 @@ impl Stages {
         if self.is_followed_well(&model) {
             return Some(model);
         }
-        let model = self.with_other_limit(model)?;
+        let model = match self.other_limit(&model) {
+            Some(other) => self.or_other(model, other)?,
+            None => model,
+        };
         if self.is_followed_well(&model) {
             return Some(model);
         }
-        let Some(bed) = self.other_beds(starts) else { return Some(model) };
-        // Readings were grouped anew.
+        match self.other_beds(starts) {
+            Some(bed) => self.or_other(model, Model::with_bed(bed)),
+            None => Some(model),
+        }
+    }
+
+    /// The model, or another one that was found with the readings as they are grouped now.
+    fn or_other(&self, model: Model, other: Model) -> Option<Model> {
         let before = Model { found: settled(&self.runs, &model.found, model.free)?, ..model };
-        let other = match self.rigid_from(&bed) {
-            Some(rigid) => self.decided(rigid, bed),
-            None => finished(&self.runs, bed, &ALL).map(Model::with_bed),
+        let other = if other.has_bed() {
+            match self.rigid_from(&other.found) {
+                Some(rigid) => self.decided(rigid, other.found),
+                None => finished(&self.runs, other.found, &ALL).map(Model::with_bed),
+            }
+        } else {
+            self.beside(other.found, None)
         };
         Some(match other {
             Some(other) => self.better(before, other),
@@ -135,20 +148,21 @@ impl Stages {
         model.found.misfit() < FOLLOWED_WELL * self.readings()
     }
 
-    /// Where nothing follows: the same with each current limit that may act, if the other unknowns then explain more. At a limit that
-    /// does not act they make up for it, and no other limit is better without another search.
-    fn with_other_limit(&self, model: Model) -> Option<Model> {
+    /// The same with another current limit, if more is explained then. With a limit that does not act the other unknowns have taken
+    /// over its effect. Another limit alone makes the misfit worse, so each one begins a search of its own.
+    fn other_limit(&mut self, model: &Model) -> Option<Model> {
         let with = |part: f64| {
             let mut start = model.found.unknowns;
             start.set(Unknown::AccelLimit, part * self.accel_mm_s2);
             search(&self.runs, start, model.free, EXCHANGED_EFFORT)
         };
-        let best = least(TRIED_LIMITS.into_iter().filter_map(with));
-        let Some(best) = best.filter(|best| best.misfit() < model.found.misfit() - PROMISE) else {
-            return Some(model);
-        };
-        let best = search(&self.runs, best.unknowns, model.free, LAST_EFFORT)?;
-        Some(Model { found: finished(&self.runs, best, model.free)?, ..model })
+        let best = least(TRIED_LIMITS.into_iter().filter_map(with))?;
+        if !(best.misfit() < model.found.misfit() - PROMISE) {
+            return None;
+        }
+        self.runs.regroup(&best.unknowns, SUBSTEPS);
+        let found = search(&self.runs, best.unknowns, model.free, LAST_EFFORT)?;
+        Some(Model { found, free: model.free, unproven: None })
     }
 
     /// The one that explains more; a bed has to explain enough.

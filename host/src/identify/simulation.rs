@@ -7,7 +7,7 @@
 //! or runs for whole sub-steps while the current limit acts. Here it stops for the part of the sub-step in
 //! which the limit acts, so positions are smooth in every unknown and difference quotients are derivatives. What
 //! the model leaves out is a remainder of up to half a sub-step at every such moment. It stays in the axis'
-//! position, so [`readings`](super::readings) must know the moments.
+//! position, so [`readings`](super::readings) must know the moments. One is where the limit is just reached, too.
 //!
 //! Most ticks have no event: no limit is reached or left, and the axis neither stops nor starts. Their sub-steps are
 //! one linear map, which [`whole_ticks`](super::whole_ticks) takes at once.
@@ -314,6 +314,24 @@ mod tests {
             );
             assert!(worst_mm < tolerance_mm, "{feed_mm_s} mm/s: {worst_mm} mm");
             assert_eq!(!moments.is_empty(), limited, "{moments:?}");
+        }
+    }
+
+    /// A step of the command asks for the most at once: here for a part of the limit.
+    #[test]
+    fn a_limit_that_is_just_reached_is_a_moment() {
+        let mut rigid = reference_y();
+        rigid.set(Unknown::BedMassRatio, 0.0);
+        rigid.set_lags(0.001, 0.0, 0.000_37);
+        let limit_mm_s = rigid.get(Unknown::AccelLimit) / rigid.get(Unknown::VelocityGain);
+        let moments = |part: f64| {
+            let feed_mm_s = part * limit_mm_s;
+            let command: Vec<f64> = (0..400).map(|tick| if tick < 100 { 0.0 } else { feed_mm_s }).collect();
+            Simulation::new(&[rigid; LANES], 5e-4, SUBSTEPS).run(&command, &mut |_, _| {})
+        };
+        // Two ticks of dead time.
+        for (part, ticks) in [(0.95, &[][..]), (0.99, &[102]), (1.01, &[102])] {
+            assert_eq!(moments(part), ticks, "{part} of the limit");
         }
     }
 

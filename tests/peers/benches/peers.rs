@@ -28,7 +28,7 @@
 //! the contenders take turns in many short rounds, and a ratio is the median over the rounds of the
 //! ratio within a round, so that a machine that slows down slows both sides. The process
 //! fails if a requirement is missed. Names on the command line select among criterion's figures;
-//! with `--test` everything runs once, without the table.
+//! as a test (`--test`, or without `--bench`) everything runs once, and no times are compared.
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -77,7 +77,9 @@ enum Requirement {
 }
 
 fn main() {
-    let is_test = std::env::args().any(|word| word == "--test");
+    // As criterion tells it.
+    let has = |option: &str| std::env::args().any(|word| word == option);
+    let is_test = has("--test") || !has("--bench");
     let mut contenders = contenders();
     let mut criterion = Criterion::default()
         .sample_size(30)
@@ -93,7 +95,9 @@ fn main() {
         });
     }
     criterion.final_summary();
-    if !is_test && !table(&rows(), &times_ns(&mut contenders)) {
+    let (warm_up, rounds) = if is_test { (0, 1) } else { (ROUNDS_WARM_UP, ROUNDS) };
+    let compared = compared(&rows(), &times_ns(&mut contenders, warm_up, rounds));
+    if !is_test && !table(&compared) {
         std::process::exit(1);
     }
 }
@@ -122,13 +126,13 @@ fn rows() -> Vec<Row> {
     ]
 }
 
-/// The times of all contenders in all rounds, taking turns \[ns per call\].
-fn times_ns(contenders: &mut [Contender]) -> Vec<(&'static str, Vec<f64>)> {
-    let mut times: Vec<_> = contenders.iter().map(|c| (c.name, Vec::with_capacity(ROUNDS))).collect();
-    for round in 0..ROUNDS_WARM_UP + ROUNDS {
+/// The times of all contenders in all rounds after those that warm up, taking turns \[ns per call\].
+fn times_ns(contenders: &mut [Contender], warm_up: usize, rounds: usize) -> Vec<(&'static str, Vec<f64>)> {
+    let mut times: Vec<_> = contenders.iter().map(|c| (c.name, Vec::with_capacity(rounds))).collect();
+    for round in 0..warm_up + rounds {
         for (contender, (_, times)) in contenders.iter_mut().zip(&mut times) {
             let ns = (contender.run)().as_secs_f64() * 1e9 / contender.calls as f64;
-            if round >= ROUNDS_WARM_UP {
+            if round >= warm_up {
                 times.push(ns);
             }
         }
@@ -136,22 +140,38 @@ fn times_ns(contenders: &mut [Contender]) -> Vec<(&'static str, Vec<f64>)> {
     times
 }
 
-/// Prints the table; false if a requirement is missed.
-fn table(rows: &[Row], times: &[(&'static str, Vec<f64>)]) -> bool {
+/// A row with its medians.
+struct Compared<'rows> {
+    row: &'rows Row,
+    ours_ns: f64,
+    peer_ns: f64,
+    ratio: f64,
+}
+
+fn compared<'rows>(rows: &'rows [Row], times: &[(&'static str, Vec<f64>)]) -> Vec<Compared<'rows>> {
     let of = |name| {
         let found = times.iter().find(|(contender, _)| *contender == name);
         &found.expect("a row names contenders that exist").1
     };
+    let of_row = |row: &'rows Row| {
+        let (ours, peer) = (of(row.ours), of(row.peer));
+        Compared {
+            row,
+            ours_ns: median(ours.iter().copied()),
+            peer_ns: median(peer.iter().copied()),
+            ratio: median(ours.iter().zip(peer).map(|(ours, peer)| ours / peer)),
+        }
+    };
+    rows.iter().map(of_row).collect()
+}
+
+/// Prints the table; false if a requirement is missed.
+fn table(compared: &[Compared]) -> bool {
     println!("\nmedians of {ROUNDS} rounds; a ratio is the median of the ratios within the rounds\n");
     println!("| ours | ns | peer | ns | ratio | required |");
     println!("|---|---|---|---|---|---|");
     let mut kept = true;
-    for row in rows {
-        let ours = of(row.ours);
-        let ours_ns = median(ours.iter().copied());
-        let peer = of(row.peer);
-        let peer_ns = median(peer.iter().copied());
-        let ratio = median(ours.iter().zip(peer).map(|(ours, peer)| ours / peer));
+    for &Compared { row, ours_ns, peer_ns, ratio } in compared {
         let (required, good) = match row.required {
             Requirement::RatioMax(most) => (format!("ratio ≤ {most:.2}"), ratio <= most),
             Requirement::None => (String::from("–"), true),

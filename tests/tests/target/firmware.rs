@@ -12,7 +12,7 @@ use std::sync::OnceLock;
 use motion_tests::figures::{Table, hold};
 
 use crate::budget::GROWTH;
-use crate::tools::Tools;
+use crate::tools::{HANGS_AFTER_S, Tools};
 
 /// The emulator's time for an instruction is 2 to this power \[ns\].
 const SHIFT: u32 = 3;
@@ -68,7 +68,8 @@ fn printed(tools: &Tools) -> Result<&'static [String], String> {
 pub(crate) fn emulator(image: &Path, serial: &str, monitor: &str, shift: u32) -> Command {
     let mut emulator = Command::new("timeout");
     emulator
-        .args(["1800", "qemu-system-arm", "-M", "netduinoplus2", "-display", "none", "-monitor", monitor])
+        .args(["--foreground", HANGS_AFTER_S])
+        .args(["qemu-system-arm", "-M", "netduinoplus2", "-display", "none", "-monitor", monitor])
         .args(["-serial", "null", "-serial", serial, "-semihosting-config", "enable=on,target=native"])
         .args(["-icount", &format!("shift={shift},sleep=off"), "-kernel"])
         .arg(image);

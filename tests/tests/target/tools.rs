@@ -101,6 +101,10 @@ pub(crate) enum Clock {
     Counting,
 }
 
+/// After which an emulator is ended, on machines however slow \[s\]. It stays in the group of its test's process, so what ends that ends
+/// it, too.
+pub(crate) const HANGS_AFTER_S: &str = "1800";
+
 /// For ARM and for RISC-V.
 const EMULATORS: [&str; 2] = ["qemu-system-arm", "qemu-system-riscv32"];
 
@@ -324,7 +328,8 @@ impl Tools {
         let mut command = Command::new("timeout");
         let emulator = if board.is_arm() { EMULATORS[0] } else { EMULATORS[1] };
         command
-            .args(["1800", emulator, "-M", board.machine, "-bios", "none", "-nographic"])
+            .args(["--foreground", HANGS_AFTER_S])
+            .args([emulator, "-M", board.machine, "-bios", "none", "-nographic"])
             .args(["-monitor", "none", "-serial", serial])
             .args(["-semihosting-config", "enable=on,target=native"])
             .arg("-device")
