@@ -193,7 +193,7 @@ mod tests {
                 let worst = whitened.iter().fold(0.0_f64, |worst, value| worst.max(value.abs()));
                 assert!(worst < 3.0, "{part} of the limit, off by {off}: {worst} standard deviations");
                 let left_mm = residuals[0].iter().fold(0.0_f64, |left, value| left.max(value.abs()));
-                assert!(left_mm > 10.0 * RESOLUTION_MM, "{part} of the limit: the clock left {left_mm} mm");
+                assert!(left_mm > 4.0 * RESOLUTION_MM, "{part} of the limit: the clock left {left_mm} mm");
             }
         }
     }
