@@ -192,8 +192,9 @@ mod tests {
                 let whitened = runs.weights(Precision::LAST).whitened(&residuals).remove(0);
                 let worst = whitened.iter().fold(0.0_f64, |worst, value| worst.max(value.abs()));
                 assert!(worst < 3.0, "{part} of the limit, off by {off}: {worst} standard deviations");
+                // Below the limit the drive's integrator runs on, and the model's stops for a part of a step.
                 let left_mm = residuals[0].iter().fold(0.0_f64, |left, value| left.max(value.abs()));
-                assert!(left_mm > 4.0 * RESOLUTION_MM, "{part} of the limit: the clock left {left_mm} mm");
+                assert!(part > 1.0 || left_mm > 4.0 * RESOLUTION_MM, "{part}: the clock left {left_mm} mm");
             }
         }
     }
