@@ -114,29 +114,16 @@ impl Stages {
         if self.is_followed_well(&model) {
             return Some(model);
         }
-        let model = match self.other_limit(&model) {
-            Some(other) => self.or_other(model, other)?,
-            None => model,
-        };
+        let model = self.with_other_limit(model)?;
         if self.is_followed_well(&model) {
             return Some(model);
         }
-        match self.other_beds(starts) {
-            Some(bed) => self.or_other(model, Model::with_bed(bed)),
-            None => Some(model),
-        }
-    }
-
-    /// The model, or another one that was found with the readings as they are grouped now.
-    fn or_other(&self, model: Model, other: Model) -> Option<Model> {
+        let Some(bed) = self.other_beds(starts) else { return Some(model) };
+        // Readings were grouped anew.
         let before = Model { found: settled(&self.runs, &model.found, model.free)?, ..model };
-        let other = if other.has_bed() {
-            match self.rigid_from(&other.found) {
-                Some(rigid) => self.decided(rigid, other.found),
-                None => finished(&self.runs, other.found, &ALL).map(Model::with_bed),
-            }
-        } else {
-            self.beside(other.found, None)
+        let other = match self.rigid_from(&bed) {
+            Some(rigid) => self.decided(rigid, bed),
+            None => finished(&self.runs, bed, &ALL).map(Model::with_bed),
         };
         Some(match other {
             Some(other) => self.better(before, other),
@@ -150,19 +137,18 @@ impl Stages {
 
     /// The same with another current limit, if more is explained then. With a limit that does not act the other unknowns have taken
     /// over its effect. Another limit alone makes the misfit worse, so each one begins a search of its own.
-    fn other_limit(&mut self, model: &Model) -> Option<Model> {
+    fn with_other_limit(&self, model: Model) -> Option<Model> {
         let with = |part: f64| {
             let mut start = model.found.unknowns;
             start.set(Unknown::AccelLimit, part * self.accel_mm_s2);
             search(&self.runs, start, model.free, EXCHANGED_EFFORT)
         };
-        let best = least(TRIED_LIMITS.into_iter().filter_map(with))?;
-        if !(best.misfit() < model.found.misfit() - PROMISE) {
-            return None;
-        }
-        self.runs.regroup(&best.unknowns, SUBSTEPS);
-        let found = search(&self.runs, best.unknowns, model.free, LAST_EFFORT)?;
-        Some(Model { found, free: model.free, unproven: None })
+        let best = least(TRIED_LIMITS.into_iter().filter_map(with));
+        let Some(best) = best.filter(|best| best.misfit() < model.found.misfit() - PROMISE) else {
+            return Some(model);
+        };
+        let best = search(&self.runs, best.unknowns, model.free, LAST_EFFORT)?;
+        Some(Model { found: finished(&self.runs, best, model.free)?, ..model })
     }
 
     /// The one that explains more; a bed has to explain enough.

@@ -96,7 +96,8 @@ fn main() {
     }
     criterion.final_summary();
     let (warm_up, rounds) = if is_test { (0, 1) } else { (ROUNDS_WARM_UP, ROUNDS) };
-    let compared = compared(&rows(), &times_ns(&mut contenders, warm_up, rounds));
+    let rows = rows();
+    let compared = compared(&rows, &times_ns(&mut contenders, warm_up, rounds));
     if !is_test && !table(&compared) {
         std::process::exit(1);
     }
