@@ -34,7 +34,7 @@ use motion_tests::check::planned;
 /// So many times as fast as the wall clock.
 const PACE: f64 = 20.0;
 /// Against a test that hangs; nothing is compared with it.
-const LONGEST: Duration = Duration::from_secs(300);
+pub(crate) const LONGEST: Duration = Duration::from_secs(300);
 
 /// Zigzag of straight lines, blended, so that all of it is one stretch: several times the items that a board has room for.
 fn zigzag(lines: u32) -> String {

@@ -10,8 +10,7 @@ use motion_host::gcode::ReadOptions;
 use motion_host::machine::Machine;
 use motion_kernel::link::State;
 
-/// Longer than anything here takes on a slow computer.
-const LONGEST: Duration = Duration::from_secs(300);
+use crate::board::LONGEST;
 
 const SQUARE: &str = "G21 G90 G61\nG1 X20 F3000\nY20\n(half)\nM0\nX0\nY0\nM2\n";
 

@@ -17,7 +17,7 @@ use motion_host::simulate::jog::Press;
 use motion_host::trace::RunTrace;
 use serde_json::Value;
 
-const LONGEST: Duration = Duration::from_secs(300);
+use crate::board::LONGEST;
 
 /// What a board was told, and what it is to tell.
 #[derive(Clone, Default)]

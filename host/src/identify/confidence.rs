@@ -21,7 +21,7 @@ use super::bed::unseen_beds;
 use super::cholesky::{Lower, Symmetric};
 use super::parameters::{ALL, Unknown, Unknowns, way};
 use super::readings::{Precision, Residuals, Runs, Weights, dot};
-use super::search::{Found, STAIRS, derivatives};
+use super::search::{Found, SEARCH_SCATTER, derivatives};
 use super::simulation::SUBSTEPS;
 use super::{Alternatives, Estimate};
 use crate::chance::Chance;
@@ -143,7 +143,7 @@ impl<'a> Place<'a> {
     fn log_likelihood(&self, other: &Place) -> f64 {
         let wider = self.factor.log_determinant() - other.factor.log_determinant();
         let worse = self.misfit - other.misfit;
-        wider - 0.5 * (worse.min(0.0) + (worse - STAIRS).max(0.0))
+        wider - 0.5 * (worse.min(0.0) + (worse - SEARCH_SCATTER).max(0.0))
     }
 
     /// A sample about `centre`, which is its own or that of another place of its width.
@@ -536,9 +536,9 @@ mod tests {
         const FREE: [Unknown; 1] = [Unknown::Offset];
         let first = || place(&FREE, 0.0, 0.1, 100.0);
         let log = |other: Place| other.log_likelihood(&first());
-        assert!((log(place(&FREE, 10.0, 0.1, 104.0 + STAIRS)) + 2.0).abs() < 1e-9);
-        assert!((log(place(&FREE, 10.0, 0.4, 104.0 + STAIRS)) - 4.0_f64.ln() + 2.0).abs() < 1e-9);
-        assert!(log(place(&FREE, 10.0, 0.1, 100.0 + 0.9 * STAIRS)).abs() < 1e-9);
+        assert!((log(place(&FREE, 10.0, 0.1, 104.0 + SEARCH_SCATTER)) + 2.0).abs() < 1e-9);
+        assert!((log(place(&FREE, 10.0, 0.4, 104.0 + SEARCH_SCATTER)) - 4.0_f64.ln() + 2.0).abs() < 1e-9);
+        assert!(log(place(&FREE, 10.0, 0.1, 100.0 + 0.9 * SEARCH_SCATTER)).abs() < 1e-9);
         assert!((log(place(&FREE, 10.0, 0.1, 96.0)) - 2.0).abs() < 1e-9);
         // Samples of both places, which are far apart.
         let counts = |log_likelihood: f64| {

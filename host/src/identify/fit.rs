@@ -10,7 +10,7 @@ use super::confidence::{Confidence, UnprovenBed, confidence};
 use super::parameters::{ALL, Unknown, Unknowns, without_bed};
 use super::readings::{Precision, Runs};
 use super::recording::{AxisRecording, span};
-use super::search::{Effort, Found, LAST_EFFORT, STAIRS, is_met, least, search};
+use super::search::{Effort, Found, LAST_EFFORT, SEARCH_SCATTER, is_met, least, search};
 use super::simulation::SUBSTEPS;
 use super::valleys::{EXCHANGED_EFFORT, NEAR, SETTLING_EFFORT, UNDECIDED, finished, settled};
 use super::{Alternatives, AxisParametersFound, BedEstimate, Estimate, IdentifyError, RunMatch};
@@ -114,7 +114,7 @@ impl Stages {
         if self.is_followed_well(&model) {
             return Some(model);
         }
-        let model = self.with_other_limit(model)?;
+        let model = self.with_other_limit(model);
         if self.is_followed_well(&model) {
             return Some(model);
         }
@@ -137,18 +137,20 @@ impl Stages {
 
     /// The same with another current limit, if more is explained then. With a limit that does not act the other unknowns have taken
     /// over its effect. Another limit alone makes the misfit worse, so each one begins a search of its own.
-    fn with_other_limit(&self, model: Model) -> Option<Model> {
+    fn with_other_limit(&self, model: Model) -> Model {
         let with = |part: f64| {
             let mut start = model.found.unknowns;
             start.set(Unknown::AccelLimit, part * self.accel_mm_s2);
             search(&self.runs, start, model.free, EXCHANGED_EFFORT)
         };
-        let best = least(TRIED_LIMITS.into_iter().filter_map(with));
-        let Some(best) = best.filter(|best| best.misfit() < model.found.misfit() - PROMISE) else {
-            return Some(model);
-        };
-        let best = search(&self.runs, best.unknowns, model.free, LAST_EFFORT)?;
-        Some(Model { found: finished(&self.runs, best, model.free)?, ..model })
+        let best = least(TRIED_LIMITS.into_iter().filter_map(with))
+            .filter(|best| best.misfit() < model.found.misfit() - PROMISE)
+            .and_then(|best| search(&self.runs, best.unknowns, model.free, LAST_EFFORT))
+            .and_then(|best| finished(&self.runs, best, model.free));
+        match best {
+            Some(found) => Model { found, ..model },
+            None => model,
+        }
     }
 
     /// The one that explains more; a bed has to explain enough.
@@ -356,7 +358,7 @@ fn without_filter(runs: &Runs, found: &Found, free: &[Unknown]) -> Option<Found>
     start.set(Unknown::FilterSpread, 0.0);
     let simpler = search(runs, start, &others, SETTLING_EFFORT)?;
     let readings = runs.readings();
-    let is_enough = simpler.misfit() < found.misfit() + libm::log(readings) + STAIRS;
+    let is_enough = simpler.misfit() < found.misfit() + libm::log(readings) + SEARCH_SCATTER;
     let rivals = || found.rivals.iter().copied().chain([found.unknowns]).collect();
     is_enough.then(|| Found { rivals: rivals(), ..simpler })
 }

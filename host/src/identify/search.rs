@@ -67,9 +67,9 @@ pub(super) const LAST_EFFORT: Effort = Effort {
 /// The gain in misfit of a Jacobian from which the end is far, and derivatives need not be exact.
 const NEAR_GAIN: f64 = 10.0;
 
-/// Two searches for one minimum end this far apart in misfit: positions are stairs where the limit acts, if low ones, and a long
-/// floor is rough.
-pub(super) const STAIRS: f64 = 10.0;
+/// Two searches for one minimum end this far apart in misfit: positions are low stairs where the limit acts, and a long floor is
+/// rough.
+pub(super) const SEARCH_SCATTER: f64 = 10.0;
 
 /// The one with the least misfit.
 pub(super) fn least(found: impl Iterator<Item = Found>) -> Option<Found> {

@@ -95,10 +95,10 @@ fn main() {
         });
     }
     criterion.final_summary();
-    let (warm_up, rounds) = if is_test { (0, 1) } else { (ROUNDS_WARM_UP, ROUNDS) };
-    let rows = rows();
-    let compared = compared(&rows, &times_ns(&mut contenders, warm_up, rounds));
-    if !is_test && !table(&compared) {
+    if is_test {
+        let is_known = |name: &str| contenders.iter().any(|contender| contender.name == name);
+        assert!(rows().iter().all(|row| is_known(row.ours) && is_known(row.peer)), "a row of no contender");
+    } else if !table(&rows(), &times_ns(&mut contenders)) {
         std::process::exit(1);
     }
 }
@@ -127,13 +127,13 @@ fn rows() -> Vec<Row> {
     ]
 }
 
-/// The times of all contenders in all rounds after those that warm up, taking turns \[ns per call\].
-fn times_ns(contenders: &mut [Contender], warm_up: usize, rounds: usize) -> Vec<(&'static str, Vec<f64>)> {
-    let mut times: Vec<_> = contenders.iter().map(|c| (c.name, Vec::with_capacity(rounds))).collect();
-    for round in 0..warm_up + rounds {
+/// The times of all contenders in all rounds, taking turns \[ns per call\].
+fn times_ns(contenders: &mut [Contender]) -> Vec<(&'static str, Vec<f64>)> {
+    let mut times: Vec<_> = contenders.iter().map(|c| (c.name, Vec::with_capacity(ROUNDS))).collect();
+    for round in 0..ROUNDS_WARM_UP + ROUNDS {
         for (contender, (_, times)) in contenders.iter_mut().zip(&mut times) {
             let ns = (contender.run)().as_secs_f64() * 1e9 / contender.calls as f64;
-            if round >= warm_up {
+            if round >= ROUNDS_WARM_UP {
                 times.push(ns);
             }
         }
@@ -141,38 +141,22 @@ fn times_ns(contenders: &mut [Contender], warm_up: usize, rounds: usize) -> Vec<
     times
 }
 
-/// A row with its medians.
-struct Compared<'rows> {
-    row: &'rows Row,
-    ours_ns: f64,
-    peer_ns: f64,
-    ratio: f64,
-}
-
-fn compared<'rows>(rows: &'rows [Row], times: &[(&'static str, Vec<f64>)]) -> Vec<Compared<'rows>> {
+/// Prints the table; false if a requirement is missed.
+fn table(rows: &[Row], times: &[(&'static str, Vec<f64>)]) -> bool {
     let of = |name| {
         let found = times.iter().find(|(contender, _)| *contender == name);
         &found.expect("a row names contenders that exist").1
     };
-    let of_row = |row: &'rows Row| {
-        let (ours, peer) = (of(row.ours), of(row.peer));
-        Compared {
-            row,
-            ours_ns: median(ours.iter().copied()),
-            peer_ns: median(peer.iter().copied()),
-            ratio: median(ours.iter().zip(peer).map(|(ours, peer)| ours / peer)),
-        }
-    };
-    rows.iter().map(of_row).collect()
-}
-
-/// Prints the table; false if a requirement is missed.
-fn table(compared: &[Compared]) -> bool {
     println!("\nmedians of {ROUNDS} rounds; a ratio is the median of the ratios within the rounds\n");
     println!("| ours | ns | peer | ns | ratio | required |");
     println!("|---|---|---|---|---|---|");
     let mut kept = true;
-    for &Compared { row, ours_ns, peer_ns, ratio } in compared {
+    for row in rows {
+        let ours = of(row.ours);
+        let ours_ns = median(ours.iter().copied());
+        let peer = of(row.peer);
+        let peer_ns = median(peer.iter().copied());
+        let ratio = median(ours.iter().zip(peer).map(|(ours, peer)| ours / peer));
         let (required, good) = match row.required {
             Requirement::RatioMax(most) => (format!("ratio ≤ {most:.2}"), ratio <= most),
             Requirement::None => (String::from("–"), true),

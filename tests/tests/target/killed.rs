@@ -22,7 +22,7 @@ use motion_tests::from_env;
 use motion_tests::random::Random;
 use serde_json::Value;
 
-use crate::linked::{Emulator, record, session};
+use crate::linked::{Emulator, TIME_OUT, record, session};
 use crate::programs;
 use crate::tools::{Board, Bundle, Case, LINKED_BOARDS, Tools};
 
@@ -32,8 +32,6 @@ const COMMAND: &str = "MOTION_TEST_COMMAND";
 const STACK_BYTES: usize = 16 << 20;
 /// Kills by all boards together, unless `MOTION_TEST_KILLS` tells another number.
 const KILLS: u64 = 50;
-/// Against hanging.
-const TIME_OUT: Duration = Duration::from_secs(900);
 /// Ends are exact, and told in decimals [mm].
 const END_MM: f64 = 1e-9;
 /// In between, offsets along pieces of some millimetres are of f32 [mm].

@@ -20,7 +20,7 @@ const AXES: usize = 3;
 /// As the board has room (`boards/qemu-mps2/src/bin/linked.rs`).
 const ITEMS: u16 = 256;
 /// Against hanging.
-const TIME_OUT: Duration = Duration::from_secs(900);
+pub(crate) const TIME_OUT: Duration = Duration::from_secs(900);
 /// Feed of the way to a program's start [mm/s].
 const WAY_MM_S: f64 = 50.0;
 /// Ticks after which a machine that has not moved rests.
