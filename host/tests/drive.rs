@@ -4,10 +4,11 @@ use motion_host::drive::circle_motion::Circle;
 use motion_host::drive::inverse::inverse;
 use motion_host::drive::reference::{self, BANDWIDTH_FEED_MM_S, CIRCLE_FEED_MM_S, Comparison};
 use motion_host::drive::step::Step;
-use motion_host::drive::{DriveError, Terms, bode, circle, experiment, harmonic, identification, inertia};
+use motion_host::drive::{DriveError, Terms, bode, circle, experiment, harmonic, inertia};
 use motion_host::gcode::Plane;
 use motion_host::machine::Machine;
 use motion_host::tuning::feedforward::series;
+use motion_host::tuning::identify_axes;
 use motion_kernel::axis::Feedforward;
 use motion_tests::s4::{CONTOUR_V, CONTOUR_VAJ, ContourTable};
 
@@ -232,7 +233,7 @@ fn a_slow_axis_is_identified() {
     let mut machine = Machine::reference();
     let x = &mut machine.axes[0];
     (x.mm_s_at_10_v, x.feed_mm_s) = (100.0, 90.0);
-    for (axis, found) in identification::identify_axes(&machine, &[0, 1]).expect("both").iter().enumerate() {
+    for (axis, found) in identify_axes(&machine, &[0, 1]).expect("both").iter().enumerate() {
         let (found, drive) = (&found.parameters, &machine.axes[axis].drive);
         let parts = [
             found.velocity_gain_per_s.value / drive.velocity_gain_per_s,

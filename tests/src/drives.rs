@@ -11,11 +11,9 @@ use motion_host::drive::DriveError;
 use motion_host::drive::circle::{CircleFigures, figures};
 use motion_host::drive::verification::{Verdict, bears_mm_s2, circle};
 use motion_host::gcode::Plane;
-use motion_host::identify::{
-    AxisParametersFound, AxisRecording, Estimate, Excitation, Identification, explore, identify,
-};
+use motion_host::identify::{AxisParametersFound, AxisRecording, Estimate, Excitation, Identification};
 use motion_host::machine::Machine;
-use motion_host::tuning::{AxisTuning, Margins, Method, propose};
+use motion_host::tuning::{AxisTuning, Margins, Method, identify_to_tune, propose};
 use motion_kernel::units::DacCode;
 
 use crate::random::Random;
@@ -30,6 +28,8 @@ const FASTEST_MM_S: f64 = 10.0 * REFERENCE_MM_S_PER_VOLT;
 pub const HALF_WIDTHS_MAX: f64 = 4.0;
 /// The mass ratio up to which a bed may be missed: it moves the axis by less than recordings tell.
 pub const MISSED_RATIO_MAX: f64 = 0.035;
+/// What a command filter trades with. An interval that spans a filter that is not seen always holds the delays of a drive that has none.
+const DELAYS: [&str; 3] = ["dead_time_s", "command_filter_s", "total_delay_s"];
 /// What margins may be off by, as a part of the true ones.
 pub const MARGINS_OFF_MAX: f64 = 0.02;
 
@@ -197,7 +197,7 @@ pub struct Surveyed {
     pub margins: Option<[Compared; 2]>,
     /// Circles before and after tuning; none without a tuning.
     pub circles: Circles,
-    /// Time that it took \[s\]: of the processor, where the system tells it.
+    /// Time that it took without recording \[s\]: of the processor, where the system tells it.
     pub time_s: f64,
 }
 
@@ -275,14 +275,18 @@ pub struct Circles {
 pub fn surveyed(seed: u64, circles_hz: &[f64]) -> Surveyed {
     let axis = RandomAxis::new(seed);
     let mut run = 0;
-    let runs = explore(REFERENCE_TICK_S, FASTEST_MM_S, |excitation| {
+    let mut recording_s = 0.0;
+    let record = |excitation: &Excitation| {
         run += 1;
-        Ok::<_, core::convert::Infallible>(axis.record(excitation, run))
-    });
-    let Ok(runs) = runs;
+        let start_s = processor_s();
+        let recording = axis.record(excitation, run);
+        recording_s += processor_s() - start_s;
+        Ok::<_, core::convert::Infallible>(recording)
+    };
     let start_s = processor_s();
-    let found = identify(&runs);
-    let time_s = processor_s() - start_s;
+    let settings = &machine(&axis).axes[0];
+    let Ok(found) = identify_to_tune(settings, REFERENCE_TICK_S, FASTEST_MM_S, record);
+    let time_s = processor_s() - start_s - recording_s;
     let has_bed = found.as_ref().is_ok_and(|found| found.parameters.bed.is_some());
     let is_met = found.as_ref().is_ok_and(Identification::is_met);
     let tuned = found.as_ref().ok().and_then(|found| Some((found, tuning(&axis, found)?)));
@@ -434,9 +438,9 @@ pub fn report(all: &[Surveyed]) -> String {
         .filter_map(|one| one.found.as_ref().ok())
         .max_by_key(|found| found.len())
         .map_or_else(Vec::new, |found| found.iter().map(|one| one.name).collect());
-    for name in names {
+    let mut row = |label: &str, name: &str, is_of: &dyn Fn(&Surveyed) -> bool| {
         let mut off: Vec<(f64, u64)> = Vec::new();
-        for one in all {
+        for one in all.iter().filter(|one| is_of(one)) {
             let claimed = one.found.iter().filter(|_| one.is_met).flatten();
             let of_name = claimed.filter(|compared| compared.name == name);
             off.extend(of_name.map(|compared| (compared.half_widths_off(), one.axis.seed)));
@@ -445,7 +449,15 @@ pub fn report(all: &[Surveyed]) -> String {
         let beyond = off.iter().filter(|(off, _)| !(*off <= HALF_WIDTHS_MAX)).count();
         let (worst, seed) = off.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, 0));
         let share = 100.0 * within as f64 / off.len().max(1) as f64;
-        line(format!("| `{name}` | {} | {share:.1} % | {beyond} | {worst:.1} | {seed} |", off.len()));
+        line(format!("| `{name}`{label} | {} | {share:.1} % | {beyond} | {worst:.1} | {seed} |", off.len()));
+    };
+    let is_filtered = |one: &Surveyed| one.axis.drive.command_filter_s > 0.0;
+    for name in names {
+        row("", name, &|_| true);
+        if DELAYS.contains(&name) {
+            row(" with a filter", name, &is_filtered);
+            row(" without", name, &|one| !is_filtered(one));
+        }
     }
     line(String::new());
     let is_right = |one: &Surveyed| {

@@ -7,7 +7,8 @@ use hal_sim::{
     REFERENCE_MM_S_PER_VOLT, REFERENCE_SUBSTEPS, REFERENCE_TICK_S, REFERENCE_X, REFERENCE_Y, SimAxis,
 };
 use motion_host::identify::{
-    AxisParametersFound, AxisRecording, Estimate, Excitation, IdentifyError, explore, figures, identify,
+    AxisParametersFound, AxisRecording, Estimate, Excitation, Identification, IdentifyError, explore,
+    figures, identify, identify_further,
 };
 use motion_kernel::units::DacCode;
 use motion_tests::drives::surveyed;
@@ -71,7 +72,7 @@ fn record(drive: DriveParameters, setup: AxisSetup, excitation: &Excitation) -> 
 
 fn recordings(drive: DriveParameters, setup: AxisSetup) -> Vec<AxisRecording> {
     let mut run = 0;
-    let recorded = explore(REFERENCE_TICK_S, 10.0 * REFERENCE_MM_S_PER_VOLT, |excitation| {
+    let recorded = explore(10.0 * REFERENCE_MM_S_PER_VOLT, |excitation| {
         run += 1;
         let noise_seed = setup.noise_seed.map(|seed| seed + run);
         Ok::<_, core::convert::Infallible>(record(drive, AxisSetup { noise_seed, ..setup }, excitation))
@@ -307,6 +308,30 @@ fn a_lead_in_covers_what_was_before_the_recording() {
     }
 }
 
+/// From what few runs tell, all runs lead to where they lead from nothing. Those of another axis lead nowhere.
+#[test]
+fn further_recordings_are_taken_in() {
+    let runs = recordings(REFERENCE_Y, SETUP);
+    let found = identify(&runs[..9]).expect("a result");
+    let further = identify_further(&found, &runs).expect("recordings").expect("a model that follows");
+    let whole = identify(&runs).expect("a result");
+    let case = case("Y", REFERENCE_Y, SETUP);
+    let of = |found: &Identification| deviations(&case, &found.parameters);
+    let (before, further, whole) = (of(&found), of(&further), of(&whole));
+    for (((before, further), whole), Column { name, .. }) in
+        before.iter().zip(&further).zip(&whole).zip(&COLUMNS)
+    {
+        println!(
+            "{name:>10}: ± {:.3}, then {:.3} ± {:.3}, {:.3} ± {:.3}",
+            before.1, further.0, further.1, whole.0, whole.1
+        );
+        assert!((further.0 - whole.0).abs() <= 0.3 * whole.1, "{name}: {}, expected {}", further.0, whole.0);
+        assert!(further.1 < 1.2 * whole.1, "{name}: ± {}, expected ± {}", further.1, whole.1);
+    }
+    let other = identify_further(&found, &recordings(REFERENCE_X, SETUP)).expect("recordings");
+    assert_eq!(other, None);
+}
+
 #[test]
 fn a_limit_that_no_run_reaches_is_not_determined() {
     let gentle = [
@@ -356,17 +381,20 @@ fn recordings_of_no_servo_axis_are_refused() {
 /// Circles of the ten drives: what the published machine had its figures from, and above its bed.
 const CIRCLES_HZ: [f64; 2] = [4.0, 16.0];
 
-/// Ten drives of which everything varies, and eleven that were found wrong. 1017 never reaches its current limit: the
+/// Ten drives of which everything varies, and those that were found wrong. 1017 never reaches its current limit: the
 /// direction in which filter, gain and current loop trade is flat there but for the drive's steps. The search for 76
 /// stops far from its end, along a floor that is curved. 245 is in a valley from which only another wrong one is seen. The
 /// bed of 255 gains little. The axis of 476 stops and starts again by itself. 521 had a bed that is not there: the rigid
 /// model had gone astray. Of 337 a wrong place was found twice, which hid the right one.
 /// The bed of 940 is not shown, but what is found is off for it. A search for 157 stays where the current limit does not act. The
 /// drive of 811 just reaches its limit, once. The floor of 578 is so rough that the right place is worse by chance.
+/// The margins of 179 and 786 are not known well by the first motions: one has a noisy encoder, the bed of the other builds up for
+/// longer than they last. The encoder of 937 is coarse, but has no noise: long motion would promise too much.
 /// `cargo bench -p motion-tests --bench identify -- 0 1000` surveys as many as one likes; `docs/DRIVES.md` is what it said.
 #[test]
 fn random_drives_are_found_and_tuned() {
-    let (mut driven, seeds) = (0, (0..10).chain([76, 157, 245, 255, 337, 476, 521, 578, 811, 940, 1017]));
+    let wrong = [76, 157, 179, 245, 255, 337, 476, 521, 578, 786, 811, 937, 940, 1017];
+    let (mut driven, seeds) = (0, (0..10).chain(wrong));
     let circles = seeds.clone().count() * CIRCLES_HZ.len();
     for seed in seeds {
         let one = surveyed(seed, &CIRCLES_HZ);

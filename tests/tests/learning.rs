@@ -7,7 +7,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use hal_sim::DriveParameters;
 use motion_host::drive::circle_motion::Circle;
-use motion_host::drive::identification::identify_axes;
 use motion_host::drive::learning::{
     CONTRACTION_MAX, Ending, LearningOptions, Learnt, Model, Reason, RepeatFigures, learn,
 };
@@ -15,6 +14,7 @@ use motion_host::drive::reference::CIRCLE_FEED_MM_S;
 use motion_host::drive::{DriveError, Recording, Terms};
 use motion_host::machine::Machine;
 use motion_host::simulate::RunOptions;
+use motion_host::tuning::identify_axes;
 
 const FREQUENCIES_HZ: [f64; 8] = [4.0, 10.0, 13.0, 16.0, 24.0, 32.0, 40.0, 48.0];
 

@@ -6,11 +6,10 @@
 use motion_host::drive::circle::{self, CircleFigures};
 use motion_host::drive::circle_motion::Circle;
 use motion_host::drive::experiment::Recording;
-use motion_host::drive::identification::identify_axes;
 use motion_host::drive::learning::{Ending, LearningOptions, learn};
 use motion_host::machine::Machine;
 use motion_host::simulate::RunOptions;
-use motion_host::tuning::{AxisTuning, Margins, Method, propose};
+use motion_host::tuning::{AxisTuning, Margins, Method, identify_axes, propose};
 use motion_tests::figures::{Table, hold};
 
 use motion_tests::random::Random;

@@ -4,13 +4,11 @@
 //! distorts the drive's response. Only the converter's output and the encoder's readings of each run are
 //! used.
 
-use std::thread;
-
 use super::AXES;
 use super::circle_motion::{Circle, plane_of};
 use super::experiment::{DriveError, Recording, fastest_mm_s, open_loop, raised};
 use super::step;
-use crate::identify::{AxisRecording, Excitation, Identification, explore, identify};
+use crate::identify::{AxisRecording, Excitation};
 use crate::machine::Machine;
 
 /// Revolutions that a circle makes besides those that are measured.
@@ -20,58 +18,45 @@ const PAIR_SHARE: f64 = 0.95;
 
 const LETTERS: [&str; AXES] = ["X", "Y", "Z"];
 
-/// Identifies the axes `axes` (from 0) of `machine`, in that order.
+/// What axis `axis` (from 0) reaches \[mm/s\].
 ///
 /// # Errors
-/// A run can't be made, or an axis does not answer like a velocity servo.
-pub fn identify_axes(machine: &Machine, axes: &[usize]) -> Result<Vec<Identification>, DriveError> {
-    let one = |axis: usize| -> Result<Identification, DriveError> {
-        let runs = recordings(machine, axis)?;
-        let name = machine.axes.get(axis).map_or_else(String::new, |axis| axis.name.clone());
-        identify(&runs).map_err(|source| DriveError::Identification { axis: name, source })
-    };
-    if thread::available_parallelism().map_or(1, usize::from) < 2 {
-        // A page has no threads.
-        return axes.iter().map(|&axis| one(axis)).collect();
-    }
-    thread::scope(|scope| {
-        let workers: Vec<_> = axes.iter().map(|&axis| scope.spawn(move || one(axis))).collect();
-        let join = |worker: thread::ScopedJoinHandle<'_, _>| {
-            worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        };
-        workers.into_iter().map(join).collect()
-    })
+/// There is no such axis.
+pub fn reach_mm_s(machine: &Machine, axis: usize) -> Result<f64, DriveError> {
+    super::experiment::within("axis", axis as f64, (0.0, AXES as f64 - 1.0))?;
+    Ok(fastest_mm_s(machine, &[axis]))
 }
 
-/// The recordings of one axis: those of [`explore`].
+/// One run of axis `axis` (from 0).
 ///
 /// # Errors
-/// A run can't be made.
-pub fn recordings(machine: &Machine, axis: usize) -> Result<Vec<AxisRecording>, DriveError> {
-    super::experiment::within("axis", axis as f64, (0.0, AXES as f64 - 1.0))?;
+/// It can't be made.
+pub fn recording(
+    machine: &Machine,
+    axis: usize,
+    excitation: &Excitation,
+) -> Result<AxisRecording, DriveError> {
     // Steps move this axis, circles another one, too, which may be slower.
     let plane = plane_of(axis);
     let [first, second, _] = plane.axes();
     let in_pairs_mm_s = PAIR_SHARE * fastest_mm_s(machine, &[first, second]);
-    explore(machine.tick_s, fastest_mm_s(machine, &[axis]), |excitation| {
-        let recording = match *excitation {
-            Excitation::Steps { feed_mm_s, cruise_s, rest_s } => {
-                steps(machine, axis, feed_mm_s, cruise_s, rest_s)?
-            }
-            Excitation::Harmonic { amplitude_mm_s, frequency_hz, periods } => {
-                // Reaching the feed and braking takes some of the periods.
-                let measured = periods.saturating_sub(RAMP_PERIODS).max(1);
-                let circle = Circle {
-                    plane,
-                    settle_s: 0.0,
-                    measured_s: f64::from(measured) / frequency_hz,
-                    ..Circle::new(frequency_hz, amplitude_mm_s.min(in_pairs_mm_s))
-                };
-                circle.record(&open_loop(machine))?
-            }
-        };
-        Ok(of_axis(&recording, axis, excitation.harmonic_hz()))
-    })
+    let recording = match *excitation {
+        Excitation::Steps { feed_mm_s, cruise_s, rest_s } => {
+            steps(machine, axis, feed_mm_s, cruise_s, rest_s)?
+        }
+        Excitation::Harmonic { amplitude_mm_s, frequency_hz, periods } => {
+            // Reaching the feed and braking takes some of the periods.
+            let measured = periods.saturating_sub(RAMP_PERIODS).max(1);
+            let circle = Circle {
+                plane,
+                settle_s: 0.0,
+                measured_s: f64::from(measured) / frequency_hz,
+                ..Circle::new(frequency_hz, amplitude_mm_s.min(in_pairs_mm_s))
+            };
+            circle.record(&open_loop(machine))?
+        }
+    };
+    Ok(of_axis(&recording, axis, excitation.harmonic_hz()))
 }
 
 /// 0 → feed → 0 → −feed → 0, each change within one tick.

@@ -12,7 +12,7 @@
 //! - [`circle_motion`]: circles of constant feed, the motion of two experiments;
 //! - [`step`]: the feed steps within one tick, open loop;
 //! - [`harmonic`]: amplitude and phase of the velocity;
-//! - [`identification`]: the runs that [`crate::identify`] asks for;
+//! - [`identification`]: the runs that identification and [`crate::tuning`] ask for;
 //! - [`recorded`]: an axis from a recording or CSV, for identification without a simulation;
 //! - [`screw`]: where the load is, place by place, which no encoder on a motor sees;
 //! - [`inertia`]: harmonic motion under a growing load, until the current limit shows;

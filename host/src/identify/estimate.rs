@@ -2,6 +2,7 @@
 
 use hal_sim::{BedMode, DriveParameters};
 
+use super::fit::Ends;
 use super::harmonic_reading::{Bandwidth, HarmonicReading};
 use super::step_reading::StepReading;
 
@@ -170,6 +171,13 @@ impl Figures {
     pub fn reading_error_mm(&self) -> f64 {
         (self.resolution_mm.powi(2) / 12.0 + self.reading_noise_mm.powi(2)).sqrt()
     }
+
+    /// Whether longer motion of the same kind tells more: whether readings have more noise than rounding. Rounding errors of motion that
+    /// repeats itself repeat, too, and average out no further.
+    #[must_use]
+    pub fn is_noisy(&self) -> bool {
+        self.reading_noise_mm > self.resolution_mm / 12.0_f64.sqrt()
+    }
 }
 
 /// How well the model follows one run.
@@ -189,6 +197,8 @@ pub struct Identification {
     pub parameters: AxisParametersFound,
     /// Other drives that the recordings allow.
     pub alternatives: Alternatives,
+    /// Where the search ended, for one with further recordings.
+    pub(super) ends: Ends,
     /// The figures that need no model.
     pub figures: Figures,
     /// The residuals by run, in the order given.
@@ -259,6 +269,21 @@ mod tests {
         let infinite = |value: f64| alternatives.estimate(value, [f64::INFINITY; 2]).half_width_95;
         assert!(infinite(f64::INFINITY).total_cmp(&0.0).is_eq());
         assert!(infinite(5.0).is_infinite());
+    }
+
+    /// Rounding has a standard deviation of 0.29 counts.
+    #[test]
+    fn noise_is_more_than_rounding() {
+        let figures = |reading_noise_mm| Figures {
+            resolution_mm: 1e-3,
+            reading_noise_mm,
+            steps: Vec::new(),
+            harmonics: Vec::new(),
+            bandwidths: Vec::new(),
+            sustained_accel_mm_s2: 0.0,
+        };
+        let is_noisy = [0.0, 0.28e-3, 0.30e-3, 0.8e-3].map(|noise_mm| figures(noise_mm).is_noisy());
+        assert_eq!(is_noisy, [false, false, true, true]);
     }
 
     #[test]

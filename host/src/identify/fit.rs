@@ -52,8 +52,18 @@ const MISS_MAX: f64 = 0.05;
 pub(super) struct Fit {
     pub(super) parameters: AxisParametersFound,
     pub(super) alternatives: Alternatives,
+    pub(super) ends: Ends,
     pub(super) runs: Vec<RunMatch>,
     pub(super) misfit_per_reading: f64,
+}
+
+/// Where a fit ended, for one with further recordings to begin from.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Ends {
+    found: Unknowns,
+    rivals: Vec<Unknowns>,
+    /// As that of a [`Model`].
+    unproven: Option<Unknowns>,
 }
 
 /// Fits the model to checked recordings.
@@ -64,6 +74,15 @@ pub(super) fn fit(recordings: &[AxisRecording], resolution_mm: f64) -> Result<Fi
     let starts = coarse(recordings, resolution_mm)?;
     let model = search.best(&starts).ok_or(too_late.clone())?;
     concluded(recordings, search.runs, &model).ok_or(too_late)?
+}
+
+/// Fits the model from where an earlier fit ended. `None` if it does not follow all recordings from there.
+pub(super) fn refit(recordings: &[AxisRecording], resolution_mm: f64, ends: &Ends) -> Option<Fit> {
+    let mut runs = Runs::new(recordings, resolution_mm);
+    runs.regroup(&ends.found, SUBSTEPS);
+    let stages = Stages { runs, accel_mm_s2: sustained_accel_mm_s2(recordings) };
+    let model = stages.again(ends)?;
+    if stages.is_followed_well(&model) { concluded(recordings, stages.runs, &model)?.ok() } else { None }
 }
 
 /// A model that was found.
@@ -153,6 +172,24 @@ impl Stages {
         }
     }
 
+    /// From where an earlier fit ended, with readings that it was not made of. They may show a bed that the earlier ones did not, and
+    /// one that those showed has to explain enough of all of them.
+    fn again(&self, ends: &Ends) -> Option<Model> {
+        let has_bed = ends.found.get(Unknown::BedMassRatio) > 0.0;
+        let free = if has_bed { &ALL } else { without_bed() };
+        let found =
+            Found { rivals: ends.rivals.clone(), ..search(&self.runs, ends.found, free, LAST_EFFORT)? };
+        if !has_bed {
+            let known = ends.unproven.and_then(|bed| search(&self.runs, bed, &ALL, LAST_EFFORT));
+            let bed = self.likely_bed(&found, known);
+            return Some(self.with_or_without(found, bed));
+        }
+        Some(match self.rigid_from(&found) {
+            Some(rigid) => self.with_or_without(rigid, Some(found)),
+            None => Model::with_bed(found),
+        })
+    }
+
     /// The one that explains more; a bed has to explain enough.
     fn better(&self, one: Model, other: Model) -> Model {
         let known = one.unproven.or(other.unproven);
@@ -198,13 +235,18 @@ impl Stages {
     /// The rigid model, or a bed beside it: one that its remainder promises, or the `known` one.
     fn beside(&self, rigid: Found, known: Option<Found>) -> Option<Model> {
         let rigid = finished(&self.runs, rigid, without_bed())?;
-        let starts = likely_beds(&self.runs, &rigid, Precision::LAST);
+        let bed = self.likely_bed(&rigid, known).filter(|bed| gain(&self.runs, &rigid, bed) > PROMISE);
+        let bed = bed.and_then(|bed| finished(&self.runs, bed, &ALL));
+        Some(self.with_or_without(rigid, bed))
+    }
+
+    /// The best of the beds that the remainder of a rigid model promises, and of a `known` one.
+    fn likely_bed(&self, rigid: &Found, known: Option<Found>) -> Option<Found> {
+        let starts = likely_beds(&self.runs, rigid, Precision::LAST);
         // What is promised is linear; a search may find more.
         let promising = starts.into_iter().take(BEDS).filter(|(_, gain)| *gain > PROMISE);
         let found = promising.filter_map(|(start, _)| search(&self.runs, start, &ALL, LAST_EFFORT));
-        let bed = least(found.chain(known)).filter(|bed| gain(&self.runs, &rigid, bed) > PROMISE);
-        let bed = bed.and_then(|bed| finished(&self.runs, bed, &ALL));
-        Some(self.with_or_without(rigid, bed))
+        least(found.chain(known))
     }
 
     /// Where it does not: beds first.
@@ -343,6 +385,7 @@ fn concluded(
     Some(Ok(Fit {
         parameters: estimates(&confidence, &found, tick_s),
         alternatives: confidence.alternatives(),
+        ends: Ends { found: found.unknowns, rivals: found.rivals.clone(), unproven: model.unproven },
         runs: matches,
         misfit_per_reading: misfit / readings,
     }))

@@ -1,6 +1,6 @@
 //! Identification: the parameters of a servo axis, from recordings of outputs and encoder readings.
 //!
-//! Consumes [`AxisRecording`]s of the motions that [`explore`] asks for, or of any others that start at rest, from an
+//! Consumes [`AxisRecording`]s of the motions that [`explore`] and [`long_harmonic`] ask for, or of any others that start at rest, from an
 //! open or a closed loop; produces an [`Identification`]. Runs in the background of the PC, mostly in two seconds of processor
 //! time for ten seconds of recordings; `docs/DRIVES.md` has the longest. It never sees the parameters of a simulation: a machine gives the
 //! same two columns.
@@ -29,7 +29,7 @@
 //! // In place of a machine.
 //! let tick_s = 0.5e-3;
 //! let model = DriveModel::new(REFERENCE_X, tick_s, 20)?;
-//! let runs = explore(tick_s, 333.0, |excitation| {
+//! let runs = explore(333.0, |excitation| {
 //!     let mut axis = DriveState::<128>::at_rest(&model, 0.0)?;
 //!     let command_mm_s = excitation.velocity_mm_s(tick_s);
 //!     let mut latch = |command_mm_s: &f64| {
@@ -78,7 +78,9 @@ pub use error::IdentifyError;
 pub use estimate::{
     Alternatives, AxisParametersFound, BedEstimate, DETERMINED, Estimate, Figures, Identification, RunMatch,
 };
-pub use excitation::{Excitation, Reach, explore, first_look, identification_plan};
+pub use excitation::{
+    Excitation, Reach, explore, first_look, highest_hz, identification_plan, long_harmonic,
+};
 pub use harmonic_reading::{Bandwidth, HarmonicReading};
 pub use recording::AxisRecording;
 pub use screw::{
@@ -94,13 +96,32 @@ pub use step_reading::StepReading;
 pub fn identify(runs: &[AxisRecording]) -> Result<Identification, IdentifyError> {
     let figures = figures(runs)?;
     let fit = fit::fit(runs, figures.resolution_mm)?;
-    Ok(Identification {
+    Ok(identification(figures, fit))
+}
+
+/// Identifies an axis once more, with further recordings: `runs` are all of it, and `found` is what some of them tell. Takes a part
+/// of the time. `None` if what was found does not lead to a model that follows all of them.
+///
+/// # Errors
+/// Recordings that can't be evaluated or show no motion.
+pub fn identify_further(
+    found: &Identification,
+    runs: &[AxisRecording],
+) -> Result<Option<Identification>, IdentifyError> {
+    let figures = figures(runs)?;
+    let fit = fit::refit(runs, figures.resolution_mm, &found.ends);
+    Ok(fit.map(|fit| identification(figures, fit)))
+}
+
+fn identification(figures: Figures, fit: fit::Fit) -> Identification {
+    Identification {
         parameters: fit.parameters,
         alternatives: fit.alternatives,
+        ends: fit.ends,
         figures,
         runs: fit.runs,
         misfit_per_reading: fit.misfit_per_reading,
-    })
+    }
 }
 
 /// The figures that need no model.

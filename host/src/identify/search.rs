@@ -140,6 +140,17 @@ pub(super) fn derivatives(
 
 /// Searches from `start` over the `free` unknowns; `None` if the start can't be simulated.
 pub(super) fn search(runs: &Runs, start: Unknowns, free: &[Unknown], effort: Effort) -> Option<Found> {
+    search_unless(runs, start, free, effort, |_| false)
+}
+
+/// The same; `None` also as soon as the search `is_vain` with what a Jacobian led to.
+pub(super) fn search_unless(
+    runs: &Runs,
+    start: Unknowns,
+    free: &[Unknown],
+    effort: Effort,
+    is_vain: impl Fn(&Found) -> bool,
+) -> Option<Found> {
     let Effort { precision, jacobians, least_gain, differences } = effort;
     let mut is_central = differences == Differences::Central;
     let weights = runs.weights(precision);
@@ -185,6 +196,9 @@ pub(super) fn search(runs: &Runs, start: Unknowns, free: &[Unknown], effort: Eff
             }
         }
         let gain = first - best.misfit();
+        if is_vain(&best) {
+            return None;
+        }
         let least_gain = least_gain.max(LEAST_PART * (best.misfit() - readings));
         found = Some(best);
         if differences == Differences::CentralAtEnd && !is_central {

@@ -8,7 +8,7 @@ use super::cholesky::Symmetric;
 use super::confidence::floor;
 use super::parameters::{Unknown, Unknowns, way};
 use super::readings::{Precision, Runs};
-use super::search::{Differences, Effort, Found, LAST_EFFORT, derivatives, is_met, search};
+use super::search::{Differences, Effort, Found, LAST_EFFORT, derivatives, is_met, search, search_unless};
 use super::simulation::SUBSTEPS;
 
 /// Over to a valley that answers alike, before it is judged.
@@ -76,6 +76,8 @@ fn kicked(runs: &Runs, mut found: Found, free: &[Unknown]) -> Option<Found> {
                 let is_rival =
                     |end: &&Found| end.misfit() < found.misfit() + RIVAL && !valley.holds(end, free);
                 let rivals: Vec<Unknowns> = ends.iter().filter(is_rival).map(|end| end.unknowns).collect();
+                // An earlier round may have ended in the same places.
+                found.rivals.retain(|known| !rivals.contains(known));
                 found.rivals.extend(rivals);
                 break;
             }
@@ -183,7 +185,10 @@ fn with_rivals(runs: &Runs, found: Found, free: &[Unknown]) -> Option<Found> {
         for start in near.unknowns.exchanged() {
             let begun = search(runs, start.bounded(free, lag_limit_s), free, EXCHANGED_EFFORT);
             let begun = begun.filter(|begun| begun.misfit() < first + NEAR && !valleys.is_back(begun));
-            if let Some(end) = begun.and_then(|begun| search(runs, begun.unknowns, free, LAST_EFFORT)) {
+            let on = |begun: Found| {
+                search_unless(runs, begun.unknowns, free, LAST_EFFORT, |place| valleys.is_back(place))
+            };
+            if let Some(end) = begun.and_then(on) {
                 valleys.add(end);
             }
         }

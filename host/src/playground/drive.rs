@@ -9,7 +9,6 @@ use super::{Answer, Progress, Stage, Work};
 use crate::drive::circle::{self, CircleFigures};
 use crate::drive::circle_motion::{Circle, plane_of};
 use crate::drive::harmonic::{self, HarmonicFigures, Response};
-use crate::drive::identification::identify_axes;
 use crate::drive::inertia::{self, InertiaFigures};
 use crate::drive::reference::{BANDWIDTH_FEED_MM_S, CIRCLE_FEED_MM_S};
 use crate::drive::step::Step;
@@ -23,7 +22,7 @@ use crate::report::drive::{
     Around, CIRCLE_LIMIT_UM, CircleSweep, TunedAxis, circle_around, circle_figures, harmonic_figures,
     inertia_figure, step_figures, tune_figures,
 };
-use crate::tuning::{self, AxisTuning, propose};
+use crate::tuning::{self, AxisTuning, identify_axes, propose};
 
 /// Frequencies of harmonic motion, of circles, and of motion under load \[Hz\]; the loads, as added inertia over the axis' own.
 const HARMONIC_HZ: [f64; 10] = [4.0, 8.0, 12.0, 16.0, 20.0, 24.0, 28.0, 32.0, 36.0, 40.0];

@@ -21,8 +21,12 @@ pub struct Margins {
     pub crossover_hz: f64,
     /// Phase margin: the additional lag that it bears, the least of all crossings \[°\].
     pub phase_deg: f64,
+    /// Where that crossing is \[Hz\].
+    pub phase_hz: f64,
     /// Gain margin: the factor by which its gain might be greater. Infinite if there is none.
     pub gain: f64,
+    /// The frequency at which it is read \[Hz\]; 0 if there is none.
+    pub gain_hz: f64,
     /// Greatest magnification of an error, |1/(1 + L)|.
     pub sensitivity: f64,
 }
@@ -71,8 +75,14 @@ impl Plant {
     /// The margins of the loop that `gains` close.
     #[must_use]
     pub fn margins(&self, gains: Gains) -> Margins {
-        let mut margins =
-            Margins { crossover_hz: 0.0, phase_deg: 180.0, gain: f64::INFINITY, sensitivity: 1.0 };
+        let mut margins = Margins {
+            crossover_hz: 0.0,
+            phase_deg: 180.0,
+            phase_hz: 0.0,
+            gain: f64::INFINITY,
+            gain_hz: 0.0,
+            sensitivity: 1.0,
+        };
         let mut before: Option<LoopPoint> = None;
         for point in self.opened(gains) {
             let closed = Complex::new(1.0 + point.open.re, point.open.im).magnitude();
@@ -81,11 +91,17 @@ impl Plant {
                 if before.is_strong() != point.is_strong() {
                     let at = self.turn(gains, before, point, LoopPoint::is_strong);
                     margins.crossover_hz = at.hz;
-                    margins.phase_deg = margins.phase_deg.min((PI + at.phase_rad).to_degrees());
+                    let phase_deg = (PI + at.phase_rad).to_degrees();
+                    if phase_deg < margins.phase_deg {
+                        (margins.phase_deg, margins.phase_hz) = (phase_deg, at.hz);
+                    }
                 }
                 if point.turns_over(&before) {
                     let at = self.turn(gains, before, point, LoopPoint::is_half_a_circle_late);
-                    margins.gain = margins.gain.min(1.0 / at.magnitude);
+                    let gain = 1.0 / at.magnitude;
+                    if gain < margins.gain {
+                        (margins.gain, margins.gain_hz) = (gain, at.hz);
+                    }
                 }
             }
             before = Some(point);

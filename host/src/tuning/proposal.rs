@@ -9,11 +9,15 @@ use motion_kernel::units::DacCode;
 
 use super::error::TuningError;
 use super::feedforward::{Method, feedforward};
-use super::gains::{GAIN_MIN, NOISE_PART, PHASE_MIN_DEG, best, kd_max, scaled, written};
+use super::gains::{GAIN_MIN, NOISE_PART, PHASE_MIN_DEG};
 use super::known::{Known, Origin};
 use super::margins::Margins;
-use crate::identify::{AxisParametersFound, BedEstimate, Estimate, Identification};
+use super::position_loop::{PositionLoop, command_gain};
+use crate::identify::{AxisParametersFound, BedEstimate, Estimate, Identification, highest_hz};
 use crate::machine::AxisSettings;
+
+/// Harmonic motion is at a frequency if its own is this near, as a part of it.
+const SAME_HZ: f64 = 0.03;
 
 /// A key of the machine file with its new value.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,29 +68,21 @@ pub fn propose(
     let parameters = &found.parameters;
     let known = Known::new(axis, parameters, tick_s)?;
     // Feedforward does nothing for what is not known. A loop has it all the same: what explains the recordings best.
-    let (drive, looped) = (&known.drive, &parameters.drive());
-    let gain = command_gain(parameters);
-    let limit = parameters.accel_limit_mm_s2;
-    let limit_mm_s2 = if limit.is_determined() { limit.value } else { axis.accel_mm_s2 };
-    let kd_max = kd_max(looped, tick_s, found.figures.reading_error_mm(), limit_mm_s2);
-    // The drive's velocity is `gain` times what the scale says, and so is the loop's gain.
-    let best = best(looped, tick_s, kd_max).ok_or_else(|| TuningError::Lag { axis: axis.name.clone() })?;
-    let gains = written(scaled(best, 1.0 / gain));
-    let loop_gains = scaled(gains, gain);
-    let margins = Margins::of(looped, loop_gains, tick_s);
-    let drives = found.alternatives.drives.iter();
-    let others: Vec<Margins> = drives.map(|drive| Margins::of(drive, loop_gains, tick_s)).collect();
-    let estimate = |of: fn(&Margins) -> f64| found.alternatives.estimate(of(&margins), others.iter().map(of));
+    let (drive, gain) = (&known.drive, command_gain(parameters));
+    let position_loop =
+        PositionLoop::new(axis, found, tick_s).ok_or_else(|| TuningError::Lag { axis: axis.name.clone() })?;
+    let PositionLoop { gains, loop_gains, margins, phase_margin_deg, gain_margin } = position_loop;
     let mut tuning = AxisTuning {
         gains,
         feedforward: feedforward(method, drive, gain, &loop_gains, tick_s),
         output_offset_v: offset_v(axis, parameters),
         margins,
-        phase_margin_deg: estimate(|margins| margins.phase_deg),
-        gain_margin: estimate(|margins| margins.gain),
+        phase_margin_deg,
+        gain_margin,
         changes: Vec::new(),
         remarks: remarks(axis, found),
     };
+    tuning.remarks.extend(unclear_margins(found, &position_loop.unclear_hz(), tick_s));
     let series = || feedforward(Method::Series, drive, gain, &loop_gains, tick_s);
     simplify(axis, &mut tuning, tick_s, series)?;
     if tuning.feedforward.drive.is_none() {
@@ -100,6 +96,20 @@ pub fn propose(
     }
     tuning.changes = changes(axis, &tuning, parameters, &known, method);
     Ok(tuning)
+}
+
+/// What to say of margins that are not known well, read at these frequencies, if no motion there was recorded that would tell more.
+fn unclear_margins(found: &Identification, frequencies_hz: &[f64], tick_s: f64) -> Option<String> {
+    let is_recorded =
+        |hz: &f64| found.figures.harmonics.iter().any(|run| (run.frequency_hz / hz - 1.0).abs() < SAME_HZ);
+    let missing = frequencies_hz.iter().filter(|&hz| *hz <= highest_hz(tick_s) && !is_recorded(hz));
+    let missing: Vec<String> = missing.map(|hz| format!("{hz:.1} Hz")).collect();
+    (found.is_met() && found.figures.is_noisy() && !missing.is_empty()).then(|| {
+        format!(
+            "Margins would be known better from some seconds of harmonic motion at {}.",
+            missing.join(" and at ")
+        )
+    })
 }
 
 /// Leaves out what the kernel would refuse, the bed first, and says so.
@@ -140,13 +150,6 @@ fn interval(estimate: Estimate, from: &str) -> String {
 /// Rounds to the four decimals that are shown; 0 has no sign.
 fn rounded_to(value: f64) -> f64 {
     (value * 1e4).round() / 1e4 + 0.0
-}
-
-/// Actual over nominal scale; 1 where the recordings do not tell it from 1.
-fn command_gain(parameters: &AxisParametersFound) -> f64 {
-    let gain = parameters.command_gain;
-    let is_told = (gain.value - 1.0).abs() > gain.half_width_95.max(1e-3);
-    if is_told && gain.value > 0.0 { gain.value } else { 1.0 }
 }
 
 /// The trim that takes the drift away. The recordings' commands are whole outputs, the old trim included, so
@@ -441,7 +444,21 @@ mod tests {
                 harmonic_hz,
             })
         };
-        identify(&explore(TICK_S, 333.0, run).expect("runs")).expect("an identification")
+        identify(&explore(333.0, run).expect("runs")).expect("an identification")
+    }
+
+    /// Motion at 12 Hz is among the recordings, and no axis is moved at over 200 Hz in these ticks.
+    #[test]
+    fn motion_that_would_tell_margins_better_is_named() {
+        let axis = Machine::reference().axes[0].clone();
+        let quiet = found(&axis, 0.0);
+        let mut noisy = quiet.clone();
+        noisy.figures.reading_noise_mm = quiet.figures.resolution_mm;
+        let said = |found: &Identification, hz: &[f64]| unclear_margins(found, hz, TICK_S);
+        let words = said(&noisy, &[33.0, 12.0, 61.0, 205.0]).expect("a remark");
+        assert!(words.contains("motion at 33.0 Hz and at 61.0 Hz."), "{words}");
+        assert_eq!([said(&noisy, &[12.0, 205.0]), said(&noisy, &[])], [None, None]);
+        assert_eq!(said(&quiet, &[33.0]), None);
     }
 
     /// What everything depends on has to be known; what the rest is not known to be stays, as far as the

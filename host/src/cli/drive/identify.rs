@@ -12,10 +12,10 @@ use crate::cli::error::{CliError, Outcome};
 use crate::cli::input;
 use crate::cli::write_json;
 use crate::drive::DriveError;
-use crate::drive::identification::identify_axes;
 use crate::drive::recorded::{self, Scales};
 use crate::identify::{Identification, identify};
 use crate::machine::Machine;
+use crate::tuning::identify_axes;
 
 const HELP: &str = "\
 With --from nothing is simulated and nothing moves. The file is a recording (`motion run --record`, `motion send

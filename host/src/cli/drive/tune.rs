@@ -18,7 +18,6 @@ use crate::cli::table::{self, Align};
 use crate::cli::write_json;
 use crate::drive::DriveError;
 use crate::drive::circle_motion::Circle;
-use crate::drive::identification::identify_axes;
 use crate::drive::learning::{LearningOptions, Learnt, Model, Reason, RepeatFigures, Robustness, learn};
 use crate::drive::recorded::Scales;
 use crate::drive::reference::CIRCLE_FEED_MM_S;
@@ -29,7 +28,7 @@ use crate::machine::{AxisEdit, AxisSettings, Machine, edited};
 use crate::report::drive::{LearntRow, TunedAxis, Tuning, tune_findings};
 use crate::report::{Findings, Verdict};
 use crate::simulate::StretchCorrection;
-use crate::tuning::{self, AxisTuning, propose};
+use crate::tuning::{self, AxisTuning, identify_axes, propose};
 
 const HELP: &str = "\
 All axes are simulated: those of the machine file, with its [axis.drive]. No axis of a real machine is moved. With --from
