@@ -22,7 +22,7 @@
 //!   axis_unit                                  mm or °
 //!   drive      Machine ─► figures of its axes     step, harmonics, circles
 //!   identify   recordings ─► drive parameters     what an axis is, from its runs
-//!   tuning     drive parameters ─► gains          with the reason for each
+//!   tuning     Machine ─► parameters ─► gains     with the reason for each
 //!   report     RunTrace ─► HTML                  one file, its data inside
 //!   ramp       limits, feeds ─► figures         one change of feed
 //!   playground request ─► steps ─► answer       what a page in a browser asks for

@@ -1,5 +1,6 @@
 //! The drive experiments through planner, streams and kernel in f32, against the reference machine's figures.
 
+use hal_sim::EncoderNoise;
 use motion_host::drive::circle_motion::Circle;
 use motion_host::drive::inverse::inverse;
 use motion_host::drive::reference::{self, BANDWIDTH_FEED_MM_S, CIRCLE_FEED_MM_S, Comparison};
@@ -245,6 +246,23 @@ fn a_slow_axis_is_identified() {
         assert!(parts.iter().all(|part| (part - 1.0).abs() < 0.02), "{axis}: {parts:?}");
         assert_eq!(found.bed.is_some(), axis == 1);
     }
+}
+
+/// A margin is not known well where the encoder has noise: X is moved once more, by a circle that Y drives with it.
+#[test]
+fn a_noisy_axis_is_moved_for_longer() {
+    let mut machine = Machine::reference();
+    let x = &mut machine.axes[0];
+    (x.mm_per_count, x.noise) = (4e-3, Some(EncoderNoise { amplitude_counts: 2, seed: 7 }));
+    let found = identify_axes(&machine, &[0, 1]).expect("both");
+    let [x, y] = found.as_slice() else { panic!("two axes") };
+    println!("{x}");
+    assert_eq!(y.runs.len(), 14);
+    assert!(x.runs.len() > 14, "{} runs", x.runs.len());
+    let gain = x.parameters.velocity_gain_per_s;
+    let is_per_s = machine.axes[0].drive.velocity_gain_per_s;
+    assert!((gain.value - is_per_s).abs() < 2.0 * gain.half_width_95, "{gain:?}");
+    assert!(gain.half_width_95 < 0.05 * gain.value, "{gain:?}");
 }
 
 #[test]

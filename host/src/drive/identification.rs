@@ -23,19 +23,25 @@ const LETTERS: [&str; AXES] = ["X", "Y", "Z"];
 /// # Errors
 /// There is no such axis.
 pub fn reach_mm_s(machine: &Machine, axis: usize) -> Result<f64, DriveError> {
-    super::experiment::within("axis", axis as f64, (0.0, AXES as f64 - 1.0))?;
+    check_axis(axis)?;
     Ok(fastest_mm_s(machine, &[axis]))
+}
+
+fn check_axis(axis: usize) -> Result<(), DriveError> {
+    super::experiment::within("axis", axis as f64, (0.0, AXES as f64 - 1.0))
 }
 
 /// One run of axis `axis` (from 0).
 ///
 /// # Errors
-/// It can't be made.
+/// There is no such axis, or the run can't be made.
 pub fn recording(
     machine: &Machine,
     axis: usize,
     excitation: &Excitation,
 ) -> Result<AxisRecording, DriveError> {
+    check_axis(axis)?;
+    let machine = &with_noise_of_its_own(machine, excitation);
     // Steps move this axis, circles another one, too, which may be slower.
     let plane = plane_of(axis);
     let [first, second, _] = plane.axes();
@@ -57,6 +63,20 @@ pub fn recording(
         }
     };
     Ok(of_axis(&recording, axis, excitation.harmonic_hz()))
+}
+
+/// A machine of which every run has other noise, as a real one has. The same noise in all of them would count as many errors of one
+/// kind.
+fn with_noise_of_its_own(machine: &Machine, excitation: &Excitation) -> Machine {
+    let run = match *excitation {
+        Excitation::Steps { feed_mm_s, .. } => feed_mm_s.to_bits(),
+        Excitation::Harmonic { frequency_hz, .. } => frequency_hz.to_bits().rotate_left(1),
+    };
+    let mut machine = machine.clone();
+    for noise in machine.axes.iter_mut().filter_map(|axis| axis.noise.as_mut()) {
+        noise.seed ^= run;
+    }
+    machine
 }
 
 /// 0 → feed → 0 → −feed → 0, each change within one tick.

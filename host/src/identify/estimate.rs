@@ -2,7 +2,7 @@
 
 use hal_sim::{BedMode, DriveParameters};
 
-use super::fit::Ends;
+use super::fit::{Ends, FOLLOWED_WELL};
 use super::harmonic_reading::{Bandwidth, HarmonicReading};
 use super::step_reading::StepReading;
 
@@ -172,10 +172,8 @@ impl Figures {
         (self.resolution_mm.powi(2) / 12.0 + self.reading_noise_mm.powi(2)).sqrt()
     }
 
-    /// Whether longer motion of the same kind tells more: whether readings have more noise than rounding. Rounding errors of motion that
-    /// repeats itself repeat, too, and average out no further.
-    #[must_use]
-    pub fn is_noisy(&self) -> bool {
+    /// Whether readings have more noise than rounding.
+    fn is_noisy(&self) -> bool {
         self.reading_noise_mm > self.resolution_mm / 12.0_f64.sqrt()
     }
 }
@@ -250,6 +248,13 @@ impl Identification {
     #[must_use]
     pub fn is_met(&self) -> bool {
         self.misfit_per_reading < MET
+    }
+
+    /// Whether [`identify_further`](super::identify_further) gains by longer motion: the model follows, to a twentieth more than the
+    /// readings' errors, and these are not rounding, which repeats itself as the motion does and averages out no further.
+    #[must_use]
+    pub fn gains_by_motion(&self) -> bool {
+        self.misfit_per_reading < FOLLOWED_WELL && self.figures.is_noisy()
     }
 }
 

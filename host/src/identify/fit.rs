@@ -31,7 +31,7 @@ const BEDS: usize = 3;
 const PROMISE: f64 = 12.0;
 /// Misfit for each reading from which what was found may be a false minimum: that of a right model scatters by some
 /// hundredths.
-const FOLLOWED_WELL: f64 = 1.05;
+pub(super) const FOLLOWED_WELL: f64 = 1.05;
 /// Beds that are tried then, without the rigid model as a guide: frequencies \[Hz\], damping and mass ratio, and
 /// Jacobians.
 const OTHER_BEDS_HZ: [f64; 9] = [5.5, 8.0, 12.0, 17.0, 25.0, 36.0, 52.0, 75.0, 108.0];
@@ -60,7 +60,7 @@ pub(super) struct Fit {
 /// Where a fit ended, for one with further recordings to begin from.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Ends {
-    found: Unknowns,
+    pub(super) found: Unknowns,
     rivals: Vec<Unknowns>,
     /// As that of a [`Model`].
     unproven: Option<Unknowns>,
@@ -173,21 +173,26 @@ impl Stages {
     }
 
     /// From where an earlier fit ended, with readings that it was not made of. They may show a bed that the earlier ones did not, and
-    /// one that those showed has to explain enough of all of them.
+    /// one that those showed has to explain enough of all of them. A model of the other kind was not looked beside yet.
     fn again(&self, ends: &Ends) -> Option<Model> {
         let has_bed = ends.found.get(Unknown::BedMassRatio) > 0.0;
         let free = if has_bed { &ALL } else { without_bed() };
         let found =
             Found { rivals: ends.rivals.clone(), ..search(&self.runs, ends.found, free, LAST_EFFORT)? };
-        if !has_bed {
+        let model = if has_bed {
+            match self.rigid_from(&found) {
+                Some(rigid) => self.with_or_without(rigid, Some(found)),
+                None => Model::with_bed(found),
+            }
+        } else {
             let known = ends.unproven.and_then(|bed| search(&self.runs, bed, &ALL, LAST_EFFORT));
             let bed = self.likely_bed(&found, known);
-            return Some(self.with_or_without(found, bed));
+            self.with_or_without(found, bed)
+        };
+        if model.has_bed() == has_bed {
+            return Some(model);
         }
-        Some(match self.rigid_from(&found) {
-            Some(rigid) => self.with_or_without(rigid, Some(found)),
-            None => Model::with_bed(found),
-        })
+        Some(Model { found: finished(&self.runs, model.found, model.free)?, ..model })
     }
 
     /// The one that explains more; a bed has to explain enough.

@@ -1,7 +1,7 @@
 //! Identification: the parameters of a servo axis, from recordings of outputs and encoder readings.
 //!
 //! Consumes [`AxisRecording`]s of the motions that [`explore`] and [`long_harmonic`] ask for, or of any others that start at rest, from an
-//! open or a closed loop; produces an [`Identification`]. Runs in the background of the PC, mostly in two seconds of processor
+//! open or a closed loop; produces an [`Identification`]. Runs in the background of the PC, mostly in one second of processor
 //! time for ten seconds of recordings; `docs/DRIVES.md` has the longest. It never sees the parameters of a simulation: a machine gives the
 //! same two columns.
 //!
@@ -100,7 +100,7 @@ pub fn identify(runs: &[AxisRecording]) -> Result<Identification, IdentifyError>
 }
 
 /// Identifies an axis once more, with further recordings: `runs` are all of it, and `found` is what some of them tell. Takes a part
-/// of the time. `None` if what was found does not lead to a model that follows all of them.
+/// of the time. `None` if what was found does not lead to a model that follows all of them, to a twentieth more than their errors.
 ///
 /// # Errors
 /// Recordings that can't be evaluated or show no motion.

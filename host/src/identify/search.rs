@@ -143,7 +143,7 @@ pub(super) fn search(runs: &Runs, start: Unknowns, free: &[Unknown], effort: Eff
     search_unless(runs, start, free, effort, |_| false)
 }
 
-/// The same; `None` also as soon as the search `is_vain` with what a Jacobian led to.
+/// The same; `None`, too, as soon as `is_vain` holds for the place that a Jacobian led to.
 pub(super) fn search_unless(
     runs: &Runs,
     start: Unknowns,

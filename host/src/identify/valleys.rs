@@ -76,7 +76,7 @@ fn kicked(runs: &Runs, mut found: Found, free: &[Unknown]) -> Option<Found> {
                 let is_rival =
                     |end: &&Found| end.misfit() < found.misfit() + RIVAL && !valley.holds(end, free);
                 let rivals: Vec<Unknowns> = ends.iter().filter(is_rival).map(|end| end.unknowns).collect();
-                // An earlier round may have ended in the same places.
+                // What was kicked once more ends in the same places.
                 found.rivals.retain(|known| !rivals.contains(known));
                 found.rivals.extend(rivals);
                 break;
@@ -185,6 +185,7 @@ fn with_rivals(runs: &Runs, found: Found, free: &[Unknown]) -> Option<Found> {
         for start in near.unknowns.exchanged() {
             let begun = search(runs, start.bounded(free, lag_limit_s), free, EXCHANGED_EFFORT);
             let begun = begun.filter(|begun| begun.misfit() < first + NEAR && !valleys.is_back(begun));
+            // A lower end of a valley that is known is lost with it; kicks along the floor find that.
             let on = |begun: Found| {
                 search_unless(runs, begun.unknowns, free, LAST_EFFORT, |place| valleys.is_back(place))
             };

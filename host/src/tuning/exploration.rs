@@ -25,7 +25,7 @@ pub fn identify_axes(machine: &Machine, axes: &[usize]) -> Result<Vec<Identifica
         let fastest_mm_s = reach_mm_s(machine, axis)?;
         let settings = &machine.axes[axis];
         let record = |excitation: &Excitation| recording(machine, axis, excitation);
-        identify_to_tune(settings, machine.tick_s, fastest_mm_s, record)?
+        identify_to_tune(settings, fastest_mm_s, record)?
             .map_err(|source| DriveError::Identification { axis: settings.name.clone(), source })
     };
     if thread::available_parallelism().map_or(1, usize::from) < 2 {
@@ -41,13 +41,12 @@ pub fn identify_axes(machine: &Machine, axes: &[usize]) -> Result<Vec<Identifica
     })
 }
 
-/// Records `axis` by `record` and identifies it. It reaches `fastest_mm_s` \[mm/s\] > 0, in ticks of `tick_s` > 0 \[s\].
+/// Records `axis` by `record` and identifies it. It reaches `fastest_mm_s` \[mm/s\] > 0.
 ///
 /// # Errors
 /// Outside: those of `record`. Inside: those of [`identify`].
 pub fn identify_to_tune<E>(
     axis: &AxisSettings,
-    tick_s: f64,
     fastest_mm_s: f64,
     mut record: impl FnMut(&Excitation) -> Result<AxisRecording, E>,
 ) -> Result<Result<Identification, IdentifyError>, E> {
@@ -57,7 +56,7 @@ pub fn identify_to_tune<E>(
         Err(error) => return Ok(Err(error)),
     };
     let reach = Reach::seen(&runs[0], fastest_mm_s);
-    let missing = missing(axis, &found, &reach, tick_s);
+    let missing = missing(axis, &found, &reach);
     if missing.is_empty() {
         return Ok(Ok(found));
     }
@@ -69,10 +68,11 @@ pub fn identify_to_tune<E>(
 }
 
 /// The motions that tell the margins of an axis better, where they are not known well.
-fn missing(axis: &AxisSettings, found: &Identification, reach: &Reach, tick_s: f64) -> Vec<Excitation> {
-    if !found.is_met() || !found.figures.is_noisy() {
+fn missing(axis: &AxisSettings, found: &Identification, reach: &Reach) -> Vec<Excitation> {
+    if !found.gains_by_motion() {
         return Vec::new();
     }
-    let unclear_hz = PositionLoop::new(axis, found, tick_s).map_or_else(Vec::new, |one| one.unclear_hz());
-    unclear_hz.into_iter().filter_map(|hz| long_harmonic(reach, &found.parameters.drive(), hz)).collect()
+    let position_loop = PositionLoop::new(axis, found, reach.tick_s);
+    let unclear_hz = position_loop.map_or_else(Vec::new, |one| one.unclear_hz());
+    unclear_hz.into_iter().filter_map(|hz| long_harmonic(reach, found, hz)).collect()
 }

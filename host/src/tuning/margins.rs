@@ -21,7 +21,7 @@ pub struct Margins {
     pub crossover_hz: f64,
     /// Phase margin: the additional lag that it bears, the least of all crossings \[°\].
     pub phase_deg: f64,
-    /// Where that crossing is \[Hz\].
+    /// The frequency of that crossing \[Hz\]; 0 if there is none.
     pub phase_hz: f64,
     /// Gain margin: the factor by which its gain might be greater. Infinite if there is none.
     pub gain: f64,

@@ -34,9 +34,9 @@ const HELP: &str = "\
 All axes are simulated: those of the machine file, with its [axis.drive]. No axis of a real machine is moved. With --from
 one axis is identified from a recording of a real one, and the circles are driven by the model that was found.
 
-The command runs velocity steps and circles in open loop. From the converter's outputs and the encoders' counts it
-estimates the parameters of each drive. From these it derives gains, with their margins, and a feedforward. Then
-it drives circles with the old and the new figures, in as many planes as it takes to move every tuned axis. Where both
+The command runs velocity steps and circles in open loop, for longer where a margin is not known well. From the
+converter's outputs and the encoders' counts it estimates the parameters of each drive. From these it derives gains,
+with their margins, and a feedforward. Then it drives circles with the old and the new figures, in as many planes as it takes to move every tuned axis. Where both
 axes of a plane were tuned, the contour error counts; where only one was, its following error counts.
 
 Examples:
