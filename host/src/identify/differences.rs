@@ -71,8 +71,8 @@ impl Parabolas {
     }
 }
 
-/// Standard deviation of a rounding error.
-fn rounding(resolution_mm: f64) -> f64 {
+/// Standard deviation of a rounding error \[mm\].
+pub(super) fn rounding(resolution_mm: f64) -> f64 {
     resolution_mm / 12.0_f64.sqrt()
 }
 

@@ -2,6 +2,7 @@
 
 use hal_sim::{BedMode, DriveParameters};
 
+use super::differences::rounding;
 use super::fit::{Ends, FOLLOWED_WELL};
 use super::harmonic_reading::{Bandwidth, HarmonicReading};
 use super::step_reading::StepReading;
@@ -174,7 +175,7 @@ impl Figures {
 
     /// Whether readings have more noise than rounding.
     fn is_noisy(&self) -> bool {
-        self.reading_noise_mm > self.resolution_mm / 12.0_f64.sqrt()
+        self.reading_noise_mm > rounding(self.resolution_mm)
     }
 }
 

@@ -159,15 +159,13 @@ fn most_borne(reach: &Reach, mut drive: Unknowns, frequency_hz: f64) -> Option<E
     }
     drive.set(Unknown::AccelLimit, BORNE_SHARE * drive.get(Unknown::AccelLimit));
     let simulation = Simulation::new(&[drive; LANES], reach.tick_s, SUBSTEPS);
-    let amplitudes = LONG_ACCEL.map(|share| reach.harmonic_mm_s(share, frequency_hz).min(reach.step_mm_s()));
-    let motions =
-        amplitudes.into_iter().filter(|amplitude_mm_s| *amplitude_mm_s > LEAST_MM_S).map(|amplitude_mm_s| {
-            let periods = (LONG_S * frequency_hz).round() as u32;
-            Excitation::Harmonic { amplitude_mm_s, frequency_hz, periods }
-        });
-    let is_borne =
-        |motion: &Excitation| simulation.run(&motion.velocity_mm_s(reach.tick_s), &mut |_, _| {}).is_empty();
-    motions.into_iter().find(is_borne)
+    let periods = (LONG_S * frequency_hz).round() as u32;
+    LONG_ACCEL
+        .into_iter()
+        .map(|share| reach.harmonic_mm_s(share, frequency_hz).min(reach.step_mm_s()))
+        .filter(|amplitude_mm_s| *amplitude_mm_s > LEAST_MM_S)
+        .map(|amplitude_mm_s| Excitation::Harmonic { amplitude_mm_s, frequency_hz, periods })
+        .find(|motion| simulation.run(&motion.velocity_mm_s(reach.tick_s), &mut |_, _| {}).is_empty())
 }
 
 /// Records an axis by `record`: a first look, and then what [`identification_plan`] asks of it.

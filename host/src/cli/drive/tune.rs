@@ -36,8 +36,9 @@ one axis is identified from a recording of a real one, and the circles are drive
 
 The command runs velocity steps and circles in open loop, for longer where a margin is not known well. From the
 converter's outputs and the encoders' counts it estimates the parameters of each drive. From these it derives gains,
-with their margins, and a feedforward. Then it drives circles with the old and the new figures, in as many planes as it takes to move every tuned axis. Where both
-axes of a plane were tuned, the contour error counts; where only one was, its following error counts.
+with their margins, and a feedforward. Then it drives circles with the old and the new figures, in as many planes as
+it takes to move every tuned axis. Where both axes of a plane were tuned, the contour error counts; where only one
+was, its following error counts.
 
 Examples:
   motion drive tune                                  see what the reference machine could do
