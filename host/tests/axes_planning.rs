@@ -564,7 +564,8 @@ fn refusals_name_the_axis_and_its_unit() {
     let mut to = [0.0; 9];
     to[1] = 1.5e6;
     let element = Element::Line { from: to, to: to.map(|mm| mm + 1.0) };
-    let step = Move { line: 3, element, feeds: Feeds::RAPID, tolerance_mm: 0.0, merging_mm: None };
+    let step =
+        Move { line: 3, element, feeds: Feeds::RAPID, tolerance_mm: 0.0, merging_mm: None, distance_mm: 0.0 };
     let refused = plan_moves("test.ngc", vec![step], &machine, Mode::Spanning).map(|_| ());
     assert_eq!(
         refused.expect_err("too far").to_string(),

@@ -509,7 +509,14 @@ fn an_involute_runs_as_it_was_programmed() {
     assert_eq!(element.kind(), "involute");
     assert!(norm(element.ends_mm().0) < 1e-12);
     let machine = Machine::reference();
-    let step = Move { line: 1, element, feeds: Feeds::xyz(30.0), tolerance_mm: 0.0, merging_mm: None };
+    let step = Move {
+        line: 1,
+        element,
+        feeds: Feeds::xyz(30.0),
+        tolerance_mm: 0.0,
+        merging_mm: None,
+        distance_mm: 0.0,
+    };
     let plan = plan_moves("involute", vec![step], &machine, Mode::default()).expect("a plan");
     assert!((plan.length_mm - 0.5 * base_mm * (to_rad * to_rad - from_rad * from_rad)).abs() < 1e-9);
     let mut farthest = 0.0_f64;

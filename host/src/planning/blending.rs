@@ -1,7 +1,7 @@
 //! Chooses the junctions that are blended, and the length of each blend.
 //!
 //! Consumes a run of moves with their tolerances; produces blocks with ceiling, law and junction feed, ready
-//! for look-ahead. Background, a bounded number of blends and of plans of at most seven blocks for each
+//! for look-ahead. Background, a bounded number of blends and of plans of at most ten blocks for each
 //! junction.
 //!
 //! **A blend has to pay.** Jerk and snap bound the motion round a corner: within a small tolerance it may
@@ -19,6 +19,10 @@
 //! acceleration-step limit as under G61, because a path of bounded jerk through them can take longer (on the
 //! arcs of a few millimetres that a corner is rounded with, by a seventh). If no such step is wanted, the
 //! machine's limit says so: with a small one only the blend pays.
+//!
+//! **Kinks** are not passed, however small they are: velocity does not step. Where G61 would pass one, it has a blend or an
+//! [easement](crate::toolpath::easement), or is a part of what a curve or a merged line stands for; where none fits the
+//! tolerance, a stop.
 
 use std::rc::Rc;
 
@@ -34,8 +38,9 @@ use super::lookahead::lookahead;
 use super::stretch::StretchBlock;
 use crate::machine::Machine;
 use crate::toolpath::blend::Blend;
+use crate::toolpath::easement::Easement;
 use crate::toolpath::smooth::{Move, Run};
-use crate::toolpath::{Greatest, SpeedRatios, norm, subtract};
+use crate::toolpath::{Element, Greatest, SpeedRatios, norm, subtract};
 
 /// Part of the time that a junction without a blend has to gain over the best one.
 const EXACT_GAIN_MIN: f64 = 0.002;
@@ -46,6 +51,8 @@ const FLAT_CORNER_RAD: f64 = 75.0 * core::f64::consts::PI / 180.0;
 
 /// Lengths of blends that are tried, as parts of the longest one.
 const SIZES: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
+/// Lengths of easements that are tried, as parts of what there is room for.
+const EASED: [f64; 2] = [1.0, 0.25];
 /// How much longer than the best found the longest blends may take for others to be tried: these gain up to
 /// an eighth.
 const PROMISING: f64 = 1.15;
@@ -53,8 +60,8 @@ const PROMISING: f64 = 1.15;
 const SWEEPS: usize = 4;
 /// How many more moves are looked at on either side of those at a junction.
 const BESIDE: usize = 1;
-/// Blocks of that many moves and the blends between them.
-const BLOCKS: usize = 2 * (2 * BESIDE + 2) - 1;
+/// Blocks of that many moves and of what rounds the junctions between them.
+const BLOCKS: usize = 3 * (2 * BESIDE + 2) - 2;
 /// How often the feeds at the ends of a comparison are lowered until every variant can be planned.
 const LOWERINGS: usize = 8;
 /// Feeds that a plan has named as just possible, made a little less.
@@ -63,32 +70,93 @@ const LESS: f64 = 1.0 - 1.0e-9;
 /// How a junction is crossed.
 #[derive(Clone, Debug, PartialEq)]
 struct Crossing<const N: usize> {
-    /// The blend; none: as it is.
-    blend: Option<Rc<Rounding<N>>>,
+    by: By<N>,
     /// The greatest feed \[mm/s\].
     feed_mm_s: f64,
 }
 
-impl<const N: usize> Crossing<N> {
-    /// Its trim of either move \[mm\].
-    fn trim_mm(&self) -> f64 {
-        self.blend.as_ref().map_or(0.0, |rounding| rounding.blend.trim_mm)
+/// What takes the place of a junction.
+#[derive(Clone, Debug, PartialEq)]
+enum By<const N: usize> {
+    /// Nothing.
+    Itself,
+    /// A kink's turn is spread over the ends of its moves.
+    Easement(Rc<Eased<N>>),
+    /// A blend.
+    Blend(Rc<Rounding<N>>),
+}
+
+impl<const N: usize> From<Rounding<N>> for Crossing<N> {
+    fn from(rounding: Rounding<N>) -> Self {
+        Self { feed_mm_s: rounding.driven.ceilings.programmed.feed_mm_s, by: By::Blend(Rc::new(rounding)) }
     }
+}
+
+impl<const N: usize> Crossing<N> {
+    /// Its trims of the move before and the move after \[mm\].
+    fn trims_mm(&self) -> [f64; 2] {
+        match &self.by {
+            By::Itself => [0.0; 2],
+            By::Easement(eased) => eased.easement.trims_mm,
+            By::Blend(rounding) => [rounding.blend.trim_mm; 2],
+        }
+    }
+
+    /// What it is driven as.
+    fn driven(&self) -> &[Driven<N>] {
+        match &self.by {
+            By::Itself => &[],
+            By::Easement(eased) => &eased.sides,
+            By::Blend(rounding) => core::slice::from_ref(&rounding.driven),
+        }
+    }
+
+    /// How far that is from the moves \[mm\].
+    fn distance_mm(&self) -> f64 {
+        match &self.by {
+            By::Itself => 0.0,
+            By::Easement(eased) => eased.easement.distance_mm,
+            By::Blend(rounding) => rounding.blend.distance_mm,
+        }
+    }
+
+    fn blend(&self) -> Option<&Rc<Rounding<N>>> {
+        match &self.by {
+            By::Blend(rounding) => Some(rounding),
+            By::Itself | By::Easement(_) => None,
+        }
+    }
+}
+
+/// An easement with what planning knows of it.
+#[derive(Clone, Debug, PartialEq)]
+struct Eased<const N: usize> {
+    easement: Easement<N>,
+    sides: Vec<Driven<N>>,
+}
+
+/// A polynomial between moves with what planning knows of it.
+#[derive(Clone, Debug, PartialEq)]
+struct Driven<const N: usize> {
+    element: Element<N>,
+    length_mm: f64,
+    greatest: Greatest<N>,
+    ratios: SpeedRatios,
+    ceilings: Ceilings,
+    /// The greatest feed at its end \[mm/s\].
+    end_mm_s: f64,
 }
 
 /// A blend with what planning knows of it.
 #[derive(Clone, Debug, PartialEq)]
 struct Rounding<const N: usize> {
     blend: Blend<N>,
-    length_mm: f64,
     /// The room that it was made for \[mm\], of which its size is a part.
     room_mm: f64,
     size: f64,
-    greatest: Greatest<N>,
-    ratios: SpeedRatios,
     /// The part of what its curvature allows with which it is driven.
     share: f64,
-    ceilings: Ceilings,
+    driven: Driven<N>,
 }
 
 /// The blocks of a run that starts and ends at rest; the junction feed of the last one is 0. An error comes
@@ -101,29 +169,28 @@ pub(super) fn blocks<const N: usize>(
     let fastest_s = candidates.iter().map(|timed| timed.time_s).fold(f64::INFINITY, f64::min);
     let junctions = Junctions::new(Run::new(moves), machine)?;
     let is_merged = junctions.run.moves().len() < moves.len();
-    let merged = junctions.exact();
-    let chosen = junctions.choose(&merged, fastest_s)?;
-    if chosen.is_empty() && is_merged {
-        candidates.push(junctions.timed(&merged));
+    let chosen = junctions.choose(fastest_s)?;
+    if chosen.is_empty() && (is_merged || candidates.is_empty()) {
+        candidates.push(junctions.timed(&junctions.exact()?));
     }
     candidates.extend(chosen);
-    if candidates.is_empty() {
-        return Ok(junctions.blocks(&merged));
-    }
-    let mut best = if is_merged {
-        let junctions = Junctions::new(Run::exact(moves), machine)?;
-        junctions.timed(&junctions.exact())
+    let as_programmed = if is_merged { Junctions::new(Run::exact(moves), machine)? } else { junctions };
+    let most_s = candidates.iter().map(|timed| timed.time_s).fold(f64::INFINITY, f64::min);
+    // Before all its kinks are eased: what it takes at least.
+    let exact = if as_programmed.least_exact_s() < most_s {
+        Some(as_programmed.timed(&as_programmed.exact()?))
     } else {
-        junctions.timed(&merged)
+        None
     };
-    let mut most_s = best.time_s / (1.0 - EXACT_GAIN_MIN);
+    let mut most_s = exact.as_ref().map_or(f64::INFINITY, |exact| exact.time_s / (1.0 - EXACT_GAIN_MIN));
+    let mut best = exact;
     for timed in candidates {
-        if timed.time_s < most_s {
+        if best.is_none() || timed.time_s < most_s {
             most_s = timed.time_s;
-            best = timed;
+            best = Some(timed);
         }
     }
-    Ok(best.blocks)
+    Ok(best.map_or_else(Vec::new, |best| best.blocks))
 }
 
 /// The blocks of a run with curves in place of what is dense, once for each bound of corners that makes a difference.
@@ -135,9 +202,9 @@ fn curved<const N: usize>(moves: &[Move<N>], machine: &Machine<N>) -> Vec<Timed<
     {
         // Nobody has programmed a curve: one that has no ceilings is no candidate.
         let Ok(junctions) = Junctions::new(run, machine) else { continue };
-        let exact = junctions.exact();
-        let Ok(mut chosen) = junctions.choose(&exact, most_s) else { continue };
-        let timed = chosen.pop().unwrap_or_else(|| junctions.timed(&exact));
+        let Ok(mut chosen) = junctions.choose(most_s) else { continue };
+        let exact = || junctions.exact().map(|exact| junctions.timed(&exact));
+        let Ok(timed) = chosen.pop().map_or_else(exact, Ok) else { continue };
         most_s = most_s.min(timed.time_s);
         candidates.push(timed);
     }
@@ -173,30 +240,42 @@ impl<'a, const N: usize> Junctions<'a, N> {
     /// The run with all blends at their longest, and with those that were found best one by one, unless the
     /// first takes so much longer than `most_s` that this would, too; none where there is nothing to blend, or
     /// where that is seen before.
-    fn choose(&self, exact: &[Crossing<N>], most_s: f64) -> AtLine<Vec<Timed<N>>> {
+    fn choose(&self, most_s: f64) -> AtLine<Vec<Timed<N>>> {
         // First as if each were alone, then those that touch within what the other leaves.
-        let alone: Vec<Option<Blend<N>>> = (0..exact.len()).map(|junction| self.longest(junction)).collect();
+        let junctions = 0..self.run.junctions();
+        let alone: Vec<Option<Blend<N>>> = junctions.map(|junction| self.longest(junction)).collect();
         if alone.iter().all(Option::is_none) {
             return Ok(Vec::new());
         }
-        let alone_mm: Vec<f64> = alone.iter().map(|blend| blend.map_or(0.0, |blend| blend.trim_mm)).collect();
         if self.least_s(&alone) > PROMISING * most_s {
             return Ok(Vec::new());
         }
-        let mut chosen = Vec::with_capacity(exact.len());
+        let alone_mm: Vec<Option<f64>> = alone.iter().map(|blend| blend.map(|blend| blend.trim_mm)).collect();
+        let mut exact: Vec<Option<Crossing<N>>> = vec![None; alone.len()];
+        for (junction, exact) in
+            exact.iter_mut().enumerate().filter(|&(junction, _)| alone[junction].is_none())
+        {
+            *exact = Some(self.exact_at(junction)?);
+        }
+        let trims_mm = |junction: usize| match &exact[junction] {
+            Some(exact) => exact.trims_mm(),
+            None => [alone_mm[junction].unwrap_or(0.0); 2],
+        };
+        let mut chosen = Vec::with_capacity(alone.len());
         for (junction, blend) in alone.into_iter().enumerate() {
-            let room_mm = self.room_mm(junction, |junction| alone_mm[junction]).min(alone_mm[junction]);
+            let room_mm = least(self.rooms_mm(junction, trims_mm)).min(trims_mm(junction)[0]);
             let blend = match blend {
                 Some(blend) if blend.trim_mm > room_mm => self.run.blend(junction, room_mm, &self.limits),
                 blend => blend,
             };
-            chosen.push(match blend {
-                Some(blend) => self.rounded(junction, blend, (room_mm, SIZES[0]))?,
-                None => exact[junction].clone(),
+            chosen.push(match (blend, &exact[junction]) {
+                (Some(blend), _) => self.rounded(junction, blend, (room_mm, SIZES[0]))?.into(),
+                (None, Some(exact)) => exact.clone(),
+                (None, None) => self.exact_at(junction)?,
             });
         }
         for junction in 0..chosen.len() {
-            if let Some(longest) = chosen[junction].blend.clone() {
+            if let Some(longest) = chosen[junction].blend().cloned() {
                 let shares = self.shared(junction, &longest)?;
                 chosen[junction] = self.best(junction, &chosen, &shares);
             }
@@ -205,14 +284,27 @@ impl<'a, const N: usize> Junctions<'a, N> {
         if longest.time_s > PROMISING * most_s {
             return Ok(vec![longest]);
         }
-        // Junctions next to a change are planned again.
+        self.settle(&mut chosen, |junction, chosen| match alone_mm[junction] {
+            Some(alone_mm) => self.variants(junction, alone_mm, chosen),
+            None => Ok(Vec::new()),
+        })?;
+        Ok(vec![longest, self.timed(&chosen)])
+    }
+
+    /// Takes the best of the variants of each junction, until nothing changes or each was looked at so many times.
+    fn settle(
+        &self,
+        chosen: &mut [Crossing<N>],
+        variants: impl Fn(usize, &[Crossing<N>]) -> AtLine<Vec<Crossing<N>>>,
+    ) -> AtLine<()> {
+        // Junctions next to a change are looked at again.
         let mut is_open = vec![true; chosen.len()];
         for _ in 0..SWEEPS {
             for junction in 0..chosen.len() {
-                if !std::mem::take(&mut is_open[junction]) || alone_mm[junction] == 0.0 {
+                if !std::mem::take(&mut is_open[junction]) {
                     continue;
                 }
-                let best = self.better(junction, alone_mm[junction], &chosen, &exact[junction])?;
+                let best = self.best(junction, chosen, &variants(junction, chosen)?);
                 if best != chosen[junction] {
                     chosen[junction] = best;
                     let beside = junction.saturating_sub(BESIDE + 1)..chosen.len().min(junction + BESIDE + 2);
@@ -221,7 +313,7 @@ impl<'a, const N: usize> Junctions<'a, N> {
                 }
             }
         }
-        Ok(vec![longest, self.timed(&chosen)])
+        Ok(())
     }
 
     /// The longest blend of a junction, as if it were alone.
@@ -240,41 +332,123 @@ impl<'a, const N: usize> Junctions<'a, N> {
         alone.iter().flatten().map(of_blend).sum()
     }
 
-    /// The room of a junction where the others trim `trim_mm`.
-    fn room_mm(&self, junction: usize, trim_mm: impl Fn(usize) -> f64) -> f64 {
+    /// The rooms of the moves of a junction where the others trim by `trims_mm`.
+    fn rooms_mm(&self, junction: usize, trims_mm: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
         let after = junction + 1;
-        let after_mm = if after < self.run.junctions() { trim_mm(after) } else { 0.0 };
-        self.run.room_mm(junction, [junction.checked_sub(1).map_or(0.0, trim_mm), after_mm])
+        let [after_mm, _] = if after < self.run.junctions() { trims_mm(after) } else { [0.0; 2] };
+        let [_, before_mm] = junction.checked_sub(1).map_or([0.0; 2], trims_mm);
+        self.run.rooms_mm(junction, [before_mm, after_mm])
     }
 
-    /// All as they are.
-    fn exact(&self) -> Vec<Crossing<N>> {
-        (0..self.run.junctions()).map(|junction| self.exact_at(junction)).collect()
+    /// All as they are, but that kinks are eased.
+    fn exact(&self) -> AtLine<Vec<Crossing<N>>> {
+        let all = (0..self.run.junctions()).map(|junction| self.exact_at(junction));
+        let exact = all.collect::<AtLine<Vec<_>>>()?;
+        if exact.iter().all(|crossing| crossing.by == By::Itself) {
+            return Ok(exact);
+        }
+        let mut settled = exact.clone();
+        self.settle(&mut settled, |junction, settled| match settled[junction].by {
+            By::Easement(_) => self.easements(junction, settled),
+            By::Itself | By::Blend(_) => Ok(Vec::new()),
+        })?;
+        Ok(if self.timed(&settled).time_s < self.timed(&exact).time_s { settled } else { exact })
     }
 
-    fn exact_at(&self, junction: usize) -> Crossing<N> {
+    /// The time that the moves take at least without blends: kinks are passed \[s\].
+    fn least_exact_s(&self) -> f64 {
+        let passed = Crossing { by: By::Itself, feed_mm_s: f64::INFINITY };
+        let mut blocks = self.blocks(&vec![passed; self.run.junctions()]);
+        for index in 1..blocks.len() {
+            let elements = [&blocks[index - 1].element, &blocks[index].element];
+            blocks[index - 1].junction_mm_s = junction_feed(elements, false, self.machine);
+        }
+        run_time_s(&blocks, self.machine.tick_s)
+    }
+
+    /// A junction without a blend; a kink that might be passed, but for the step of velocity, with the fastest of its easements
+    /// within half of its moves.
+    fn exact_at(&self, junction: usize) -> AtLine<Crossing<N>> {
+        if self.is_eased(junction) {
+            let eased = self.eased(junction, self.rooms_mm(junction, |_| [f64::INFINITY; 2]))?.into_iter();
+            let fastest = eased.max_by(|one, other| one.feed_mm_s.total_cmp(&other.feed_mm_s));
+            if let Some(fastest) = fastest {
+                return Ok(fastest);
+            }
+        }
         let [before, after] = [junction, junction + 1]
             .map(|index| (&self.run.moves()[index], &self.ceilings[index].programmed));
-        let feed_mm_s = junction_feed(&before.0.element, &after.0.element, self.machine);
-        Crossing { blend: None, feed_mm_s: feed_mm_s.min(before.1.feed_mm_s).min(after.1.feed_mm_s) }
+        let elements = [&before.0.element, &after.0.element];
+        let feed_mm_s = junction_feed(elements, self.run.kink_rad(junction).is_some(), self.machine);
+        let feed_mm_s = feed_mm_s.min(before.1.feed_mm_s).min(after.1.feed_mm_s);
+        Ok(Crossing { by: By::Itself, feed_mm_s })
+    }
+
+    /// Whether a junction is a kink that might be passed under G61, but is to be smooth.
+    fn is_eased(&self, junction: usize) -> bool {
+        self.run.kink_rad(junction).is_some_and(|kink_rad| kink_rad <= self.machine.path.junction_angle_rad)
+    }
+
+    /// A junction with each of its easements within `rooms_mm`.
+    fn eased(&self, junction: usize, rooms_mm: [f64; 2]) -> AtLine<Vec<Crossing<N>>> {
+        let easements = self.run.easements(junction, rooms_mm);
+        easements.into_iter().map(|easement| self.eased_by(junction, easement)).collect()
+    }
+
+    /// A junction with an easement.
+    fn eased_by(&self, junction: usize, easement: Easement<N>) -> AtLine<Crossing<N>> {
+        let share = self.machine.path.curve_feed_share;
+        let sides = easement.elements.iter().map(|&element| self.driven(junction, element, share));
+        let mut sides = sides.collect::<AtLine<Vec<_>>>()?;
+        // All that meets at the joint.
+        let [before, after] = [junction, junction + 1].map(|index| &self.run.moves()[index].element);
+        let met = match (&easement.elements[..], easement.trims_mm) {
+            ([first, second], _) => [first, second],
+            ([only], [_, 0.0]) => [only, after],
+            ([only], _) => [before, only],
+            _ => [before, after],
+        };
+        let joint_mm_s = junction_feed(met, true, self.machine);
+        // Ramps have more of the limits below what they can reach from the joint.
+        let most = [&self.ceilings[junction], &self.ceilings[junction + 1]].into_iter();
+        let most = most.chain(sides.iter().map(|side| &side.ceilings)).map(|of| of.greatest.feed_mm_s);
+        let most_mm_s = most.fold(joint_mm_s, f64::min);
+        let most_trim_mm = easement.trims_mm[0].max(easement.trims_mm[1]);
+        let reach_mm_s = (most_mm_s.powi(2) + 2.0 * self.limits.accel_mm_s2 * most_trim_mm).sqrt();
+        for side in &mut sides {
+            if side.ceilings.programmed.feed_mm_s > reach_mm_s {
+                let reason = side.ceilings.programmed.reason;
+                let lowered = ceilings(reach_mm_s, &side.greatest, &side.ratios, share, self.machine);
+                let lowered = lowered.map_err(|error| (self.run.moves()[junction].line, error.into()))?;
+                let lowered = Ceiling { reason, ..lowered.programmed };
+                side.ceilings = Ceilings { programmed: lowered, greatest: lowered, ..side.ceilings };
+            }
+        }
+        if easement.trims_mm[0] > 0.0
+            && let Some(first) = sides.first_mut()
+        {
+            first.end_mm_s = joint_mm_s;
+        }
+        let feeds = sides.iter().map(|side| side.ceilings.programmed.feed_mm_s);
+        let feed_mm_s = feeds.fold(joint_mm_s, f64::min);
+        Ok(Crossing { feed_mm_s, by: By::Easement(Rc::new(Eased { easement, sides })) })
     }
 
     /// A junction with a blend that is a part of what `room_mm` allows, driven at the greatest share.
-    fn rounded(&self, junction: usize, blend: Blend<N>, (room_mm, size): (f64, f64)) -> AtLine<Crossing<N>> {
-        let (share, length_mm) = (BLEND_FEED_SHARE, blend.element.length_mm());
-        // How a curve bends takes a search along it: once, whatever share it is then given.
-        let greatest = blend.element.greatest();
-        let ratios = SpeedRatios::of(&blend.element, &self.machine.letters_by_place());
-        let ceilings = self.ceilings_of(junction, &greatest, &ratios, share)?;
-        let rounding = Rounding { blend, length_mm, room_mm, size, greatest, ratios, share, ceilings };
-        Ok(Crossing { feed_mm_s: ceilings.programmed.feed_mm_s, blend: Some(Rc::new(rounding)) })
+    fn rounded(&self, junction: usize, blend: Blend<N>, (room_mm, size): (f64, f64)) -> AtLine<Rounding<N>> {
+        let share = BLEND_FEED_SHARE;
+        let driven = self.driven(junction, blend.element, share)?;
+        Ok(Rounding { blend, room_mm, size, share, driven })
     }
 
-    /// A junction with a blend that is driven as it says.
-    fn crossing(&self, junction: usize, rounding: &Rounding<N>) -> AtLine<Crossing<N>> {
-        let ceilings = self.ceilings_of(junction, &rounding.greatest, &rounding.ratios, rounding.share)?;
-        let rounding = Rounding { ceilings, ..rounding.clone() };
-        Ok(Crossing { feed_mm_s: ceilings.programmed.feed_mm_s, blend: Some(Rc::new(rounding)) })
+    /// What is put in the place of a junction, driven at a share.
+    fn driven(&self, junction: usize, element: Element<N>, share: f64) -> AtLine<Driven<N>> {
+        // How a curve bends takes a search along it: once, whatever share it is then given.
+        let greatest = element.greatest();
+        let ratios = SpeedRatios::of(&element, &self.machine.letters_by_place());
+        let ceilings = self.ceilings_of(junction, &greatest, &ratios, share)?;
+        let length_mm = element.length_mm();
+        Ok(Driven { element, length_mm, greatest, ratios, ceilings, end_mm_s: f64::INFINITY })
     }
 
     fn ceilings_of(
@@ -292,36 +466,59 @@ impl<'a, const N: usize> Junctions<'a, N> {
 
     /// A junction with the same blend, once driven at each of the two shares.
     fn shared(&self, junction: usize, rounding: &Rounding<N>) -> AtLine<[Crossing<N>; 2]> {
-        let at = |share: f64| self.crossing(junction, &Rounding { share, ..rounding.clone() });
+        let at = |share: f64| {
+            let mut rounding = Rounding { share, ..rounding.clone() };
+            let Driven { greatest, ratios, .. } = &rounding.driven;
+            rounding.driven.ceilings = self.ceilings_of(junction, greatest, ratios, share)?;
+            Ok(Crossing::from(rounding))
+        };
         Ok([at(BLEND_FEED_SHARE)?, at(self.machine.path.curve_feed_share)?])
     }
 
-    /// The best crossing of a junction whose longest blend alone trims `alone_mm`, the others being crossed as
+    /// The crossings of a junction to choose from, whose longest blend alone trims `alone_mm`, the others being crossed as
     /// `chosen` says.
-    fn better(
-        &self,
-        junction: usize,
-        alone_mm: f64,
-        chosen: &[Crossing<N>],
-        exact: &Crossing<N>,
-    ) -> AtLine<Crossing<N>> {
-        let room_mm = self.room_mm(junction, |junction| chosen[junction].trim_mm()).min(alone_mm);
-        let is_known = |rounding: &Rc<Rounding<N>>| rounding.size == SIZES[0] && rounding.room_mm == room_mm;
-        let longest = match chosen[junction].blend.clone().filter(is_known) {
-            Some(rounding) => Some(rounding),
-            None => match self.run.blend(junction, room_mm, &self.limits) {
-                Some(blend) => self.rounded(junction, blend, (room_mm, SIZES[0]))?.blend,
+    fn variants(&self, junction: usize, alone_mm: f64, chosen: &[Crossing<N>]) -> AtLine<Vec<Crossing<N>>> {
+        let rooms_mm = self.rooms_mm(junction, |junction| chosen[junction].trims_mm());
+        let room_mm = least(rooms_mm).min(alone_mm);
+        let is_known = |rounding: &Rounding<N>| rounding.size == SIZES[0] && rounding.room_mm == room_mm;
+        let longest = match chosen[junction].blend() {
+            Some(rounding) if is_known(rounding) => Some(Rounding::clone(rounding)),
+            _ => match self.run.blend(junction, room_mm, &self.limits) {
+                Some(blend) => Some(self.rounded(junction, blend, (room_mm, SIZES[0]))?),
                 None => None,
             },
         };
-        let Some(longest) = longest else { return Ok(exact.clone()) };
-        let mut variants = Vec::with_capacity(2 * SIZES.len() + 1);
-        variants.extend(self.shared(junction, &longest)?);
-        for &size in &SIZES[1..] {
-            variants.extend(self.shorter(junction, &longest, size)?);
+        let mut variants = Vec::with_capacity(2 * SIZES.len() + 3 * EASED.len());
+        if let Some(longest) = longest {
+            variants.extend(self.shared(junction, &longest)?);
+            for &size in &SIZES[1..] {
+                variants.extend(self.shorter(junction, &longest, size)?);
+            }
         }
-        variants.push(exact.clone());
-        Ok(self.best(junction, chosen, &variants))
+        let eased = self.easements(junction, chosen)?;
+        if eased.is_empty() {
+            variants.push(self.exact_at(junction)?);
+        }
+        variants.extend(eased);
+        Ok(variants)
+    }
+
+    /// A kink that might be passed under G61 with easements of some lengths, in the room that the others, crossed as `chosen`
+    /// says, leave it, but at most half of either move: one that takes more leaves the next kink next to nothing.
+    fn easements(&self, junction: usize, chosen: &[Crossing<N>]) -> AtLine<Vec<Crossing<N>>> {
+        if !self.is_eased(junction) {
+            return Ok(Vec::new());
+        }
+        let [left_mm, half_mm] = [
+            self.rooms_mm(junction, |junction| chosen[junction].trims_mm()),
+            self.rooms_mm(junction, |_| [f64::INFINITY; 2]),
+        ];
+        let rooms_mm: [f64; 2] = core::array::from_fn(|index| left_mm[index].min(half_mm[index]));
+        let mut all = Vec::with_capacity(3 * EASED.len());
+        for part in EASED {
+            all.extend(self.eased(junction, rooms_mm.map(|room_mm| part * room_mm))?);
+        }
+        Ok(all)
     }
 
     /// A junction with a part of its longest blend, at each of the two shares; nothing if there is none.
@@ -329,15 +526,15 @@ impl<'a, const N: usize> Junctions<'a, N> {
         let Some(blend) = self.run.blend(junction, size * longest.room_mm, &self.limits) else {
             return Ok(Vec::new());
         };
-        let crossing = self.rounded(junction, blend, (longest.room_mm, size))?;
-        match &crossing.blend {
-            Some(rounding) => Ok(self.shared(junction, rounding)?.into()),
-            None => Ok(Vec::new()),
-        }
+        let rounding = self.rounded(junction, blend, (longest.room_mm, size))?;
+        Ok(self.shared(junction, &rounding)?.into())
     }
 
     /// The best of some crossings of a junction, the others being crossed as `chosen` says.
     fn best(&self, junction: usize, chosen: &[Crossing<N>], variants: &[Crossing<N>]) -> Crossing<N> {
+        if variants.is_empty() {
+            return chosen[junction].clone();
+        }
         let windows: Vec<Vec<Block<f64>>> =
             variants.iter().map(|variant| self.window(junction, variant, chosen)).collect();
         let (first, last) = self.beside(junction);
@@ -347,7 +544,7 @@ impl<'a, const N: usize> Junctions<'a, N> {
         let feeds = common_feeds(&windows, [feed(first.checked_sub(1)), feed(Some(last))]);
         let mut best = (&chosen[junction], f64::INFINITY);
         for (variant, blocks) in variants.iter().zip(&windows) {
-            let gain = if variant.blend.is_none() { EXACT_GAIN_MIN } else { 0.0 };
+            let gain = if variant.blend().is_none() { EXACT_GAIN_MIN } else { 0.0 };
             let time_s = window_time_s(blocks, feeds);
             if time_s < (1.0 - gain) * best.1 {
                 best = (variant, time_s);
@@ -365,11 +562,13 @@ impl<'a, const N: usize> Junctions<'a, N> {
     fn window(&self, changed: usize, variant: &Crossing<N>, chosen: &[Crossing<N>]) -> Vec<Block<f64>> {
         let crossing =
             |junction: usize| if junction == changed { Some(variant) } else { chosen.get(junction) };
-        let trim_mm = |junction: Option<usize>| junction.and_then(crossing).map_or(0.0, Crossing::trim_mm);
+        let trims_mm =
+            |junction: Option<usize>| junction.and_then(crossing).map_or([0.0; 2], Crossing::trims_mm);
         let (first, last) = self.beside(changed);
         let mut blocks = Vec::with_capacity(BLOCKS);
         for index in first..=last {
-            let length_mm = self.run.length_mm(index) - trim_mm(index.checked_sub(1)) - trim_mm(Some(index));
+            let ([_, first_mm], [last_mm, _]) = (trims_mm(index.checked_sub(1)), trims_mm(Some(index)));
+            let length_mm = self.run.length_mm(index) - first_mm - last_mm;
             let after = crossing(index).filter(|_| index < last);
             let junction_mm_s = after.map_or(f64::INFINITY, |after| after.feed_mm_s);
             let block = |length_mm, ceiling: &Ceiling<f64>, junction_mm_s| Block {
@@ -379,9 +578,12 @@ impl<'a, const N: usize> Junctions<'a, N> {
                 law: ceiling.law,
             };
             blocks.push(block(length_mm, &self.ceilings[index].programmed, junction_mm_s));
-            if let Some(rounding) = after.and_then(|after| after.blend.as_ref()) {
-                blocks.push(block(rounding.length_mm, &rounding.ceilings.programmed, f64::INFINITY));
-            }
+            let driven = after.map_or(&[][..], Crossing::driven);
+            blocks.extend(
+                driven
+                    .iter()
+                    .map(|driven| block(driven.length_mm, &driven.ceilings.programmed, driven.end_mm_s)),
+            );
         }
         blocks
     }
@@ -395,34 +597,41 @@ impl<'a, const N: usize> Junctions<'a, N> {
     /// The blocks of the run.
     fn blocks(&self, crossings: &[Crossing<N>]) -> Vec<StretchBlock<N>> {
         let mut blocks: Vec<StretchBlock<N>> = Vec::with_capacity(2 * self.ceilings.len());
-        let trim_mm = |junction: Option<usize>| {
-            junction.and_then(|junction| crossings.get(junction)).map_or(0.0, Crossing::trim_mm)
+        let trims_mm = |junction: Option<usize>| {
+            junction.and_then(|junction| crossings.get(junction)).map_or([0.0; 2], Crossing::trims_mm)
         };
         for (index, (step, &ceilings)) in self.run.moves().iter().zip(&self.ceilings).enumerate() {
-            let (first_mm, last_mm) = (trim_mm(index.checked_sub(1)), trim_mm(Some(index)));
+            let ([_, first_mm], [last_mm, _]) = (trims_mm(index.checked_sub(1)), trims_mm(Some(index)));
             let is_whole = first_mm == 0.0 && last_mm == 0.0;
             let element = if is_whole { step.element } else { step.element.trimmed(first_mm, last_mm) };
-            let block = |element, ceilings: Ceilings, tolerance_share| StretchBlock {
+            let block = |element, ceilings: Ceilings, is_smoothed, tolerance_share| StretchBlock {
                 line: step.line,
                 element,
                 ceiling: ceilings.programmed,
                 greatest: ceilings.greatest,
                 feed_mm_s: ceilings.feed_mm_s,
                 junction_mm_s: 0.0,
+                is_smoothed,
                 tolerance_share,
             };
-            blocks.push(block(element, ceilings, self.run.tolerance_share(index)));
-            if let Some(rounding) = crossings.get(index).and_then(|crossing| crossing.blend.as_ref()) {
-                let share = self.run.tolerance_share_of(index, &rounding.blend);
-                blocks.push(block(rounding.blend.element, rounding.ceilings, share));
+            blocks.push(block(element, ceilings, step.tolerance_mm > 0.0, self.run.tolerance_share(index)));
+            if let Some(crossing) = crossings.get(index) {
+                let of = |driven: &Driven<N>| {
+                    let share = self.run.tolerance_share_of(index, crossing.distance_mm());
+                    block(driven.element, driven.ceilings, true, share)
+                };
+                blocks.extend(crossing.driven().iter().map(of));
             }
         }
         for index in 1..blocks.len() {
-            blocks[index - 1].junction_mm_s =
-                junction_feed(&blocks[index - 1].element, &blocks[index].element, self.machine);
+            blocks[index - 1].junction_mm_s = blocks[index - 1].junction_feed(&blocks[index], self.machine);
         }
         blocks
     }
+}
+
+fn least([one, other]: [f64; 2]) -> f64 {
+    one.min(other)
 }
 
 /// Feeds at both ends that all windows can be planned with, at most `feeds` \[mm/s\].
@@ -479,6 +688,7 @@ fn stretch_time_s<const N: usize>(stretch: &[StretchBlock<N>], tick_s: f64) -> O
 mod tests {
     use super::*;
     use crate::toolpath::smooth::tests::path;
+    use crate::toolpath::{Feeds, add, angle, scale};
 
     fn blocks_of(moves: &[Move]) -> Vec<StretchBlock> {
         blocks(moves, &Machine::reference()).expect("a machine's limits")
@@ -488,8 +698,7 @@ mod tests {
     fn blended(moves: &[Move]) -> Vec<StretchBlock> {
         let machine = Machine::reference();
         let junctions = Junctions::new(Run::new(moves), &machine).expect("a machine's limits");
-        let exact = junctions.exact();
-        let mut chosen = junctions.choose(&exact, f64::INFINITY).expect("limits");
+        let mut chosen = junctions.choose(f64::INFINITY).expect("limits");
         chosen.pop().expect("corners").blocks
     }
 
@@ -509,6 +718,59 @@ mod tests {
             assert!(pair[0].junction_mm_s > 1e6, "{}", pair[0].junction_mm_s);
         }
         assert!(blocks_of(&[]).is_empty());
+    }
+
+    /// Lines, curves and an involute that meet at kinks: within the tolerance each takes up the turn, and there is no stop. Where the
+    /// tolerance is too small for that there is one.
+    #[test]
+    fn kinks_are_eased_whatever_meets_there() {
+        let machine = Machine::reference();
+        let unit = |rad: f64| [libm::cos(rad), libm::sin(rad), 0.0];
+        let involute = crate::toolpath::Involute::new(([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]), 5.0, (0.5, 1.5))
+            .expect("a shape");
+        for kink_rad in [1e-8, 1e-4, 8e-3] {
+            // A line that runs into an involute, which runs into another line.
+            let flank = Element::involute([0.0; 3], involute);
+            let ([start, end], (from, to)) = (flank.ends(), flank.ends_mm());
+            let heading_rad = |tangent: [f64; 3]| libm::atan2(tangent[1], tangent[0]);
+            let before = scale(unit(heading_rad(start.tangent) - kink_rad), -10.0);
+            let after = scale(unit(heading_rad(end.tangent) + kink_rad), 10.0);
+            let elements = [
+                Element::Line { from: add(from, before), to: from },
+                flank,
+                Element::Line { from: to, to: add(to, after) },
+            ];
+            let blocks = |tolerance_mm: f64| {
+                let moves: Vec<Move> = (1..)
+                    .zip(elements)
+                    .map(|(line, element)| Move {
+                        line,
+                        element,
+                        feeds: Feeds::xyz(20.0),
+                        tolerance_mm,
+                        merging_mm: None,
+                        distance_mm: 0.0,
+                    })
+                    .collect();
+                super::blocks(&moves, &machine).expect("limits")
+            };
+            let (eased, exact, tight) = (blocks(0.02), blocks(0.0), blocks(1e-13));
+            assert_eq!(
+                kinds(&eased),
+                [(1, "line"), (1, "blend"), (2, "involute"), (2, "blend"), (3, "line")]
+            );
+            for pair in eased.windows(2) {
+                let turn_rad = angle(pair[0].element.ends()[1].tangent, pair[1].element.ends()[0].tangent);
+                assert!(
+                    turn_rad < 1e-9 && pair[0].junction_mm_s > 5.0,
+                    "{turn_rad} {}",
+                    pair[0].junction_mm_s
+                );
+            }
+            assert!(eased.iter().all(|block| block.tolerance_share <= 1.0));
+            assert!(exact.len() == 3 && exact[..2].iter().all(|block| block.junction_mm_s > 5.0));
+            assert!(tight.len() == 3 && tight[..2].iter().all(|block| block.junction_mm_s == 0.0));
+        }
     }
 
     /// Between a small blend and a big one, the big one gets what the small one leaves; two big ones share.

@@ -12,7 +12,7 @@ use super::error::AtLine;
 use crate::gcode::Axis;
 use crate::machine::Machine;
 use crate::toolpath::fairing::feeds::lower;
-use crate::toolpath::smooth::{Move, Run, TANGENT_ROUNDING_RAD};
+use crate::toolpath::smooth::{Move, Run, TANGENT_ROUNDING_RAD, kink_rad};
 use crate::toolpath::{Element, Greatest, Role, SpeedRatios, angle, norm, subtract};
 
 /// The ceilings of a move.
@@ -158,13 +158,17 @@ fn lower_curve<const N: usize>(
     Ok(())
 }
 
-/// The greatest feed from one element to the next \[mm/s\]; 0 where the machine has to stop.
+/// The greatest feed from one element to the next \[mm/s\]; 0 where the machine has to stop. Where the path `is_smoothed`,
+/// velocity is not to step: a kink is not passed.
 pub(super) fn junction_feed<const N: usize>(
-    before: &Element<N>,
-    after: &Element<N>,
+    elements: [&Element<N>; 2],
+    is_smoothed: bool,
     machine: &Machine<N>,
 ) -> f64 {
-    let ([_, end], [start, _]) = (before.ends(), after.ends());
+    if is_smoothed && kink_rad(elements).is_some() {
+        return 0.0;
+    }
+    let ([_, end], [start, _]) = (elements[0].ends(), elements[1].ends());
     let angle_rad = angle(end.tangent, start.tangent);
     let steps = Junction { angle_rad, curvature_step_per_mm: norm(subtract(start.curvature, end.curvature)) };
     few_digits(junction(

@@ -17,6 +17,7 @@ use super::outputs::Switches;
 use super::travel;
 use crate::gcode::{Feed, LineMove, Message, Nurbs, PathMode, ProbeMove, Step, StepKind};
 use crate::machine::Machine;
+use crate::toolpath::joint::meet;
 use crate::toolpath::merge::merge;
 use crate::toolpath::smooth::{Move, is_same_run};
 use crate::toolpath::{Element, Feeds, SpeedRatios, Vector};
@@ -213,7 +214,10 @@ impl<'m, const N: usize> Runs<'m, N> {
 
     /// Takes moves, up to one that leaves the travel.
     pub(super) fn go(&mut self, moves: impl IntoIterator<Item = Move<N>>) -> AtLine<()> {
-        for step in moves {
+        for mut step in moves {
+            if let Some(before) = self.run.last_mut() {
+                meet(before, &mut step, self.machine.path.junction_angle_rad);
+            }
             travel::check_move(&step.element, self.machine).map_err(|problem| (step.line, problem))?;
             self.run_s += self.time_s(&step);
             self.run.push(step);
@@ -339,5 +343,5 @@ pub(super) fn move_at<const N: usize>(
         PathMode::Blend { merging_mm, .. } => merging_mm,
         PathMode::Unprogrammed | PathMode::ExactPath | PathMode::ExactStop => None,
     };
-    Move { line, element, feeds, tolerance_mm: machine.path.tolerance_mm(mode), merging_mm }
+    Move { line, element, feeds, tolerance_mm: machine.path.tolerance_mm(mode), merging_mm, distance_mm: 0.0 }
 }

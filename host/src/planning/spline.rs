@@ -41,6 +41,7 @@ pub fn plan_spline<const N: usize>(
         feeds: Feeds::RAPID,
         tolerance_mm: 0.0,
         merging_mm: None,
+        distance_mm: 0.0,
     };
     let spans = spline.elements().map(|(point, element)| Move {
         line: line(point),
@@ -48,6 +49,7 @@ pub fn plan_spline<const N: usize>(
         element,
         tolerance_mm: 0.0,
         merging_mm: None,
+        distance_mm: 0.0,
     });
     let moves: Vec<Move<N>> = (norm(start) > 0.0).then_some(approach).into_iter().chain(spans).collect();
     // Before the plan, which knows a cusp only as a limit of 0.

@@ -27,12 +27,20 @@ pub struct StretchBlock<const N: usize = 3> {
     pub feed_mm_s: f64,
     /// Greatest feed through the junction at its end \[mm/s\].
     pub junction_mm_s: f64,
+    /// The program lets the path be changed within a tolerance.
+    pub is_smoothed: bool,
     /// Greatest distance from the programmed path and of it from the block, over its tolerance: a bound, 0
     /// where the path is exact.
     pub tolerance_share: f64,
 }
 
 impl<const N: usize> StretchBlock<N> {
+    /// The greatest feed into the block behind it \[mm/s\]; 0 where the machine has to stop.
+    pub(super) fn junction_feed(&self, after: &Self, machine: &Machine<N>) -> f64 {
+        let is_smoothed = self.is_smoothed && after.is_smoothed;
+        junction_feed([&self.element, &after.element], is_smoothed, machine)
+    }
+
     /// The block as look-ahead sees it.
     pub(super) fn for_lookahead(&self) -> Block<f64> {
         let Ceiling { feed_mm_s: cap_mm_s, law, .. } = self.ceiling;
@@ -80,7 +88,7 @@ impl<'m, const N: usize> Growing<'m, N> {
             if let Some(mut last) = self.last.take() {
                 // Within a section it is known already.
                 if std::mem::take(&mut self.is_cut) {
-                    last.junction_mm_s = junction_feed(&last.element, &block.element, self.machine);
+                    last.junction_mm_s = last.junction_feed(&block, self.machine);
                     self.ahead.set_junction(last.junction_mm_s);
                 }
                 self.give(last, known)?;

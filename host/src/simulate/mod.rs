@@ -33,6 +33,7 @@ pub mod error;
 pub mod job;
 pub mod faults;
 pub mod inject;
+mod kinks;
 mod limit_share;
 pub mod live;
 mod converters;

@@ -22,6 +22,7 @@ use super::faults;
 use super::hardware::{Hardware, SimulatedHardware, simulated};
 use super::inject::Injections;
 use super::job::{Job, Number, RunOptions, StretchCorrection};
+use super::kinks::Kinks;
 use super::limit_share::LimitShare;
 use super::probing::{Probed, Probing};
 use super::summary::{AxisSummary, Collector, RunSummary};
@@ -138,6 +139,7 @@ pub struct Execution<'a, R: Real, H, const N: usize> {
     summary: RunSummary,
     collector: Collector<N>,
     contour: Contour<N>,
+    kinks: Kinks<N>,
     limit_share: LimitShare<'a, N>,
     probing: Probing<'a>,
     commands: Commands<'a>,
@@ -191,6 +193,7 @@ impl<'a, R: Real, H: Hardware<N>, const N: usize> Execution<'a, R, H, N> {
             summary,
             collector: Collector::new(),
             contour: Contour::new(info.linear_places()),
+            kinks: Kinks::of(&job.items),
             limit_share: LimitShare::new(info),
             probing: Probing::new(info),
             commands: Commands::new(script.as_ref(), tick_s),
@@ -225,7 +228,12 @@ impl<'a, R: Real, H: Hardware<N>, const N: usize> Execution<'a, R, H, N> {
         let ended = background.ended(state);
         let start_mm = info.starts_mm.get(trace.executed.stretches as usize).copied();
         let start_mm = start_mm.unwrap_or(info.path_length_mm);
-        let row = trace_row(&trace, start_mm, &mut self.contour);
+        let mut row = trace_row(&trace, start_mm, &mut self.contour);
+        let at = (u64::from(trace.executed.stretches), trace.executed.motion.s);
+        let kinks_mm_s2 = self.kinks.passed(at, row.v_mm_s, header.tick_s);
+        for (axis, kink_mm_s2) in row.axes.iter_mut().zip(kinks_mm_s2) {
+            axis.kink_mm_s2 = kink_mm_s2;
+        }
         collector.add(&row);
         self.limit_share.add(&row);
         self.probing.tick(&trace);
@@ -311,6 +319,7 @@ pub(crate) fn trace_row<R: Real, const N: usize>(
             set_mm: output.set.to_mm(),
             vel_mm_s: setpoint.velocity_mm_s.to_f64(),
             acc_mm_s2: setpoint.accel_mm_s2.to_f64(),
+            kink_mm_s2: 0.0,
             jerk_mm_s3: setpoint.jerk_mm_s3.to_f64(),
             act_mm: output.actual.to_mm(),
             err_um: output.following_error_mm.to_f64() * 1e3,

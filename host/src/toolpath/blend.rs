@@ -69,10 +69,10 @@ const JUMP: f64 = 0.03;
 /// Corrections of the trim d until the distance fits the tolerance.
 const CORRECTIONS_MAX: usize = 8;
 /// Part of the tolerance at which it fits.
-const CLOSE: f64 = 0.998;
+pub(super) const CLOSE: f64 = 0.998;
 /// Part of the tolerance that is made use of: the pieces are a little off their curve, by 10⁻⁶ mm at most,
 /// and a millionth of its length.
-const TOLERANCE_USED: f64 = 0.999;
+pub(super) const TOLERANCE_USED: f64 = 0.999;
 
 /// A blend, and the path that it replaces.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -190,7 +190,7 @@ struct Corner<const N: usize> {
 }
 
 /// One element of a corner. Lengths along it count from the corner.
-enum Side<const N: usize> {
+pub(super) enum Side<const N: usize> {
     /// Away from the corner, and the tangent of the path.
     Line { away: Vector<N>, tangent: Vector<N> },
     /// The angle at the corner, and how it changes with the length from it.
@@ -224,17 +224,8 @@ impl<const N: usize> Corner<N> {
             ];
             (point, by_parameter)
         });
-        let [(start, [d1, d2, d3]), (end, [e1, e2, e3])] = ends;
-        // From the derivatives at an end, the control points next to it.
-        let near = |point, d1, d2, d3| {
-            let first = add(point, scale(d1, 1.0 / 7.0));
-            let second = add(subtract(scale(first, 2.0), point), scale(d2, 1.0 / 42.0));
-            let third = add(add(scale(subtract(second, first), 3.0), point), scale(d3, 1.0 / 210.0));
-            [first, second, third]
-        };
-        let [b1, b2, b3] = near(start, d1, d2, d3);
-        let [b6, b5, b4] = near(end, scale(e1, -1.0), e2, scale(e3, -1.0));
-        (start, Polynomial::bezier([start, b1, b2, b3, b4, b5, b6, end]))
+        let [start, end] = ends;
+        (start.0, Polynomial::between(start, end))
     }
 
     /// A trim to begin with within a tolerance, and the power of it with which the distance grows: at a corner
@@ -352,7 +343,7 @@ struct Guess {
 
 impl<const N: usize> Side<N> {
     /// The side that `element` is, before or after the corner. None for a polynomial.
-    fn new(element: &Element<N>, is_before: bool) -> Option<Self> {
+    pub(super) fn new(element: &Element<N>, is_before: bool) -> Option<Self> {
         match element {
             Element::Line { from, to } => {
                 let [end, _] = element.ends();
@@ -369,7 +360,7 @@ impl<const N: usize> Side<N> {
         }
     }
 
-    fn room_mm(&self) -> f64 {
+    pub(super) fn room_mm(&self) -> f64 {
         match self {
             Self::Line { .. } => f64::INFINITY,
             Self::Arc { rad_per_mm, .. } => ARC_RAD_MAX / rad_per_mm.abs(),
@@ -377,7 +368,7 @@ impl<const N: usize> Side<N> {
     }
 
     /// The point `trim_mm` from the corner, relative to it, and the path's derivatives by arc length there.
-    fn at(&self, trim_mm: f64) -> (Vector<N>, [Vector<N>; 3]) {
+    pub(super) fn at(&self, trim_mm: f64) -> (Vector<N>, [Vector<N>; 3]) {
         match self {
             Self::Line { away, tangent } => (scale(*away, trim_mm), [*tangent, [0.0; N], [0.0; N]]),
             Self::Arc { shape, corner_rad, rad_per_mm } => {
@@ -388,7 +379,7 @@ impl<const N: usize> Side<N> {
     }
 
     /// Its first `trim_mm`, to measure distances from.
-    fn near(&self, trim_mm: f64) -> Near<N> {
+    pub(super) fn near(&self, trim_mm: f64) -> Near<N> {
         match self {
             Self::Line { away, .. } => Near::Line { away: *away, trim_mm },
             Self::Arc { shape, corner_rad, rad_per_mm } => {
@@ -399,13 +390,13 @@ impl<const N: usize> Side<N> {
 }
 
 /// A side up to its trim, relative to the corner.
-enum Near<const N: usize> {
+pub(super) enum Near<const N: usize> {
     Line { away: Vector<N>, trim_mm: f64 },
     Arc(NearArc<N>),
 }
 
 impl<const N: usize> Near<N> {
-    fn distance_mm(&self, point: Vector<N>) -> f64 {
+    pub(super) fn distance_mm(&self, point: Vector<N>) -> f64 {
         match self {
             Self::Line { away, trim_mm } => {
                 let foot = dot(point, *away).clamp(0.0, *trim_mm);
@@ -417,7 +408,7 @@ impl<const N: usize> Near<N> {
 }
 
 /// Part of an arc, its angle counted from the corner.
-struct NearArc<const N: usize> {
+pub(super) struct NearArc<const N: usize> {
     shape: Spiral<N>,
     /// The angle at its end, and its sine and cosine.
     end_rad: f64,

@@ -11,9 +11,11 @@
 //! - [`rational`]: NURBS, span by span;
 //! - [`curve`]: derivatives of a curve by its parameter and by arc length;
 //! - [`smooth`]: a run of elements with the blend of each of its junctions, by
-//!   [`blend`]: one corner's septic blend, [`merge`]: short lines to fewer lines and arcs, and `dense`: runs
+//!   [`blend`]: one corner's septic blend, [`easement`]: a kink spread over the ends of both sides, [`merge`]: short
+//!   lines to fewer lines and arcs, and `dense`: runs
 //!   of short lines and arcs to curves, by
 //!   [`fairing`]: the curve that bends least within a tolerance;
+//! - `joint`: programmed curves that meet at a kink;
 //! - [`septic`]: curves to pieces of degree seven in arc length, with checked error;
 //! - [`greatest`]: how curves and their pieces bend at their tightest;
 //! - [`speeds`]: the speeds of the axes on an element, and what feed a program allows along it;
@@ -28,10 +30,12 @@ pub mod blend;
 pub mod compile;
 pub mod curve;
 mod dense;
+pub mod easement;
 pub mod element;
 pub mod fairing;
 pub mod greatest;
 pub mod involute;
+pub(crate) mod joint;
 pub mod merge;
 pub mod polynomial;
 pub mod rational;

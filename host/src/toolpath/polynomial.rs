@@ -11,7 +11,7 @@ use motion_kernel::plan::Bend;
 
 use super::curve::{Curve, four_by_arc_length, gauss, refined_length};
 use super::greatest::{Greatest, Peak, bend};
-use super::{Vector, add, norm, scale};
+use super::{Vector, add, norm, scale, subtract};
 
 /// Highest power.
 pub const DEGREE: usize = 7;
@@ -54,6 +54,29 @@ impl<const N: usize> Polynomial<N> {
             scale(differences[0], BINOMIALS[index])
         });
         Self { coefficients }
+    }
+
+    /// The curve between two points, each with the first to third derivative by the parameter that the curve has there \[mm\].
+    pub(super) fn between(
+        (start, [d1, d2, d3]): (Vector<N>, [Vector<N>; 3]),
+        (end, [e1, e2, e3]): (Vector<N>, [Vector<N>; 3]),
+    ) -> Self {
+        // From the derivatives at an end, the control points next to it.
+        let near = |point, d1, d2, d3| {
+            let first = add(point, scale(d1, 1.0 / 7.0));
+            let second = add(subtract(scale(first, 2.0), point), scale(d2, 1.0 / 42.0));
+            let third = add(add(scale(subtract(second, first), 3.0), point), scale(d3, 1.0 / 210.0));
+            [first, second, third]
+        };
+        let [b1, b2, b3] = near(start, d1, d2, d3);
+        let [b6, b5, b4] = near(end, scale(e1, -1.0), e2, scale(e3, -1.0));
+        Self::bezier([start, b1, b2, b3, b4, b5, b6, end])
+    }
+
+    /// The sum of two curves, offset by offset.
+    pub(super) fn plus(&self, other: &Self) -> Self {
+        let sum = |power: usize| add(self.coefficients[power], other.coefficients[power]);
+        Self { coefficients: core::array::from_fn(sum) }
     }
 
     /// c₁ … c₇ \[mm\].

@@ -19,6 +19,7 @@ use motion_kernel::law::Limits;
 
 use super::blend::{Blend, has_side, trim_mm};
 use super::dense::{Faired, faired};
+use super::easement::Easement;
 use super::element::Element;
 use super::merge::{Merged, merge};
 use super::{Feeds, Greatest, Vector, angle, norm, subtract};
@@ -49,6 +50,8 @@ pub struct Move<const N: usize = 3> {
     /// How far a line may be from what stands for it and others \[mm\], on top of the tolerance; without it,
     /// a part of the tolerance.
     pub merging_mm: Option<f64>,
+    /// How far the element is from the programmed one \[mm\].
+    pub distance_mm: f64,
 }
 
 impl<const N: usize> Move<N> {
@@ -102,7 +105,10 @@ impl<const N: usize> Run<N> {
         Self::of(moves.to_vec(), vec![0.0; moves.len()], Vec::new())
     }
 
-    fn of(moves: Vec<Move<N>>, distances_mm: Vec<f64>, greatest: Vec<Option<Greatest<N>>>) -> Self {
+    fn of(moves: Vec<Move<N>>, mut distances_mm: Vec<f64>, greatest: Vec<Option<Greatest<N>>>) -> Self {
+        for (distance_mm, step) in distances_mm.iter_mut().zip(&moves) {
+            *distance_mm = distance_mm.max(step.distance_mm);
+        }
         let lengths_mm = moves.iter().map(|step| step.element.length_mm()).collect();
         Self { moves, lengths_mm, distances_mm, greatest }
     }
@@ -139,13 +145,13 @@ impl<const N: usize> Run<N> {
         share(self.distances_mm[index], merging_mm.unwrap_or(tolerance_mm))
     }
 
-    /// The same of a blend of a junction: what its moves are off adds to what it is off these.
+    /// The same of what rounds a junction and is so far from its moves: what they are off adds to it.
     #[must_use]
-    pub fn tolerance_share_of(&self, junction: usize, blend: &Blend<N>) -> f64 {
+    pub fn tolerance_share_of(&self, junction: usize, off_mm: f64) -> f64 {
         let [before, after] = [junction, junction + 1].map(|index| &self.moves[index]);
         let merging_mm = before.merging_mm.unwrap_or(0.0).max(after.merging_mm.unwrap_or(0.0));
         let distance_mm = self.distances_mm[junction].max(self.distances_mm[junction + 1]);
-        share(blend.distance_mm + distance_mm, before.tolerance_mm.min(after.tolerance_mm) + merging_mm)
+        share(off_mm + distance_mm, before.tolerance_mm.min(after.tolerance_mm) + merging_mm)
     }
 
     /// The blend of a junction with at most `room_mm` of either move; none where nothing steps.
@@ -157,12 +163,30 @@ impl<const N: usize> Run<N> {
         {
             return None;
         }
-        // A move of exact path is cut at neither end.
-        let tolerance_mm = before.tolerance_mm.min(after.tolerance_mm);
+        Blend::new(&before.element, &after.element, self.left_mm(junction), room_mm, limits)
+    }
+
+    /// The easements of a junction with at most `rooms_mm` of the two moves.
+    #[must_use]
+    pub fn easements(&self, junction: usize, rooms_mm: [f64; 2]) -> Vec<Easement<N>> {
+        let elements = [&self.moves[junction].element, &self.moves[junction + 1].element];
+        Easement::all(elements, self.left_mm(junction), rooms_mm)
+    }
+
+    /// The angle of a junction \[rad\] where velocity would step at it and the path may be changed.
+    #[must_use]
+    pub fn kink_rad(&self, junction: usize) -> Option<f64> {
+        let (before, after) = (&self.moves[junction], &self.moves[junction + 1]);
+        let kink_rad = kink_rad([&before.element, &after.element])?;
+        (before.tolerance_mm.min(after.tolerance_mm) > 0.0).then_some(kink_rad)
+    }
+
+    /// What is left of the tolerance of a junction \[mm\]. A move of exact path is cut at neither end.
+    fn left_mm(&self, junction: usize) -> f64 {
+        let (before, after) = (&self.moves[junction], &self.moves[junction + 1]);
         let spent_mm =
             before.spent_mm(self.distances_mm[junction]).max(after.spent_mm(self.distances_mm[junction + 1]));
-        let tolerance_mm = tolerance_mm - spent_mm;
-        Blend::new(&before.element, &after.element, tolerance_mm, room_mm, limits)
+        before.tolerance_mm.min(after.tolerance_mm) - spent_mm
     }
 
     /// What blends may take of a move together \[mm\]. At the start and the end of the run motion needs room
@@ -173,14 +197,14 @@ impl<const N: usize> Run<N> {
         self.lengths_mm[index] * if is_end { 0.5 * TAKEN_MAX } else { TAKEN_MAX }
     }
 
-    /// The greatest trim of a blend where those at the neighbouring junctions trim `trims_mm` \[mm\], at
-    /// least half of what is there.
+    /// The greatest trims of the two moves of a junction where what is at their other ends trims them by
+    /// `trims_mm` \[mm\], at least half of what is there.
     #[must_use]
-    pub fn room_mm(&self, junction: usize, [before_mm, after_mm]: [f64; 2]) -> f64 {
+    pub fn rooms_mm(&self, junction: usize, [before_mm, after_mm]: [f64; 2]) -> [f64; 2] {
         let left_mm = |index: usize, other_mm: f64| {
             (self.taken_mm_max(index) - other_mm).max(0.5 * TAKEN_MAX * self.lengths_mm[index])
         };
-        left_mm(junction, before_mm).min(left_mm(junction + 1, after_mm))
+        [left_mm(junction, before_mm), left_mm(junction + 1, after_mm)]
     }
 }
 
@@ -295,6 +319,21 @@ impl Room {
     }
 }
 
+/// The angle from one element to the next \[rad\], where it is more than rounding.
+pub(crate) fn kink_rad<const N: usize>([before, after]: [&Element<N>; 2]) -> Option<f64> {
+    let kink_rad = angle(before.ends()[1].tangent, after.ends()[0].tangent);
+    // Lengths may take a quadrature.
+    let is_kink = kink_rad > TANGENT_ROUNDING_RAD
+        && kink_rad > direction_rounding_rad(before.length_mm().min(after.length_mm()));
+    is_kink.then_some(kink_rad)
+}
+
+/// How well directions of pieces agree where they are meant to, the shorter of which has that length \[rad\]: the ends of
+/// pieces are rounded to position steps.
+pub(crate) fn direction_rounding_rad(length_mm: f64) -> f64 {
+    2.0 * TANGENT_ROUNDING_RAD + 4.0e-10 / length_mm
+}
+
 /// Whether nothing steps from one element to the next.
 pub(super) fn is_smooth<const N: usize>([before, after]: [&Element<N>; 2]) -> bool {
     let ([_, end], [start, _]) = (before.ends(), after.ends());
@@ -318,7 +357,7 @@ pub(crate) mod tests {
             .map(|(pair, line)| {
                 let element = Element::Line { from: point(pair[0]), to: point(pair[1]) };
                 let feeds = Feeds::xyz(feed_mm_s(line));
-                Move { line, element, feeds, tolerance_mm, merging_mm: None }
+                Move { line, element, feeds, tolerance_mm, merging_mm: None, distance_mm: 0.0 }
             })
             .collect()
     }

@@ -218,6 +218,9 @@ pub struct AxisTick {
     pub vel_mm_s: f64,
     /// Set acceleration \[mm/s²\].
     pub acc_mm_s2: f64,
+    /// What a kink of the path that this tick passes steps velocity by, over the tick \[mm/s²\]; 0 elsewhere, and where
+    /// the path is not at hand.
+    pub kink_mm_s2: f64,
     /// Set jerk \[mm/s³\].
     pub jerk_mm_s3: f64,
     /// Actual position from the encoder \[mm\].

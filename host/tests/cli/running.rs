@@ -134,6 +134,45 @@ fn run_under_live_control() {
     assert!(at_rest > 1000 && (end_mm - 60.0).abs() < 1e-9, "{at_rest} {end_mm}");
 }
 
+/// As an exact path a kink of 0.004 rad is passed at 50 mm/s: velocity steps by 0.2 mm/s, which is 400 mm/s² over a tick, and the
+/// trace says so once. Within a tolerance nothing steps.
+#[test]
+fn the_trace_has_the_acceleration_of_a_kink() {
+    let workspace = Workspace::new("kink");
+    let greatest_mm_s2 = |mode: &str| {
+        workspace.put("kink.ngc", &format!("G21 {mode}\nG1 X20 F3000\nG1 X40 Y0.08\nM2\n"));
+        workspace.json(&[
+            "run",
+            "kink.ngc",
+            "--json",
+            "--trace",
+            "kink.csv",
+            "--columns",
+            "v_mm_s,Y_vel_mm_s,Y_acc_mm_s2",
+        ]);
+        let trace = workspace.read("kink.csv");
+        let rows: Vec<Vec<f64>> = trace
+            .lines()
+            .skip(1)
+            .map(|line| line.split(',').map(|number| number.parse().expect("a number")).collect())
+            .collect();
+        let steps = rows.iter().filter(|row| row[2] > 100.0).count();
+        let greatest = rows.iter().max_by(|a, b| a[2].total_cmp(&b[2])).expect("ticks").clone();
+        // What velocity changes by is what acceleration says, in every tick.
+        for pair in rows.windows(2) {
+            let changed = (pair[1][1] - pair[0][1]) / 0.0005;
+            let most = 1e-3 * greatest[2] + 5e3 * 0.0005 + 1e-3;
+            assert!((changed - pair[1][2]).abs() < most, "{mode}: {changed} mm/s², said {}", pair[1][2]);
+        }
+        (greatest[0], greatest[2], steps)
+    };
+    let (feed_mm_s, accel_mm_s2, steps) = greatest_mm_s2("G61");
+    assert!((feed_mm_s - 50.0).abs() < 1e-6 && steps == 1);
+    assert!((accel_mm_s2 - 50.0 * 0.004 / 0.0005).abs() < 0.01, "{accel_mm_s2}");
+    let (_, accel_mm_s2, steps) = greatest_mm_s2("G64 P0.01");
+    assert!(steps == 0 && accel_mm_s2 < 20.0, "{accel_mm_s2}");
+}
+
 /// A run with commands, and one that ends in a fault: recorded, and once more from the recording alone.
 #[test]
 fn replay_of_a_recorded_run() {

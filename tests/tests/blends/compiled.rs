@@ -65,9 +65,9 @@ pub(super) fn compiled(plan: &Plan) -> Vec<Vec<Compiled>> {
     stretches
 }
 
-/// Nothing but snap steps within a stretch: gaps [mm], and steps of the first three derivatives, made numbers by the
-/// length of the shorter piece.
-pub(super) fn continuous(stretches: &[Vec<Compiled>]) -> Result<(), String> {
+/// Nothing up to the derivative of that order steps within a stretch, three of them at most: gaps [mm], and steps of the first
+/// three derivatives, made numbers by the length of the shorter piece.
+pub(super) fn continuous(stretches: &[Vec<Compiled>], order: usize) -> Result<(), String> {
     for pair in stretches.iter().flat_map(|pieces| pieces.windows(2)) {
         let (end, start) = (pair[0].at(1.0), pair[1].at(0.0));
         let shorter = pair[0].length.min(pair[1].length);
@@ -76,7 +76,7 @@ pub(super) fn continuous(stretches: &[Vec<Compiled>]) -> Result<(), String> {
         // Coordinates are rounded to 2⁻³² mm and lines have their direction from them.
         let rounding = 2e-9 + 4e-10 / shorter;
         let limits = [2e-9, rounding, rounding, 10.0 * rounding];
-        if !steps.iter().zip(limits).all(|(&step, limit)| step <= limit) {
+        if !steps.iter().zip(limits).take(order + 1).all(|(&step, limit)| step <= limit) {
             return Err(format!(
                 "steps {steps:?} between pieces of {} and {} mm",
                 pair[0].length, pair[1].length

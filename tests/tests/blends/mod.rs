@@ -7,11 +7,12 @@
 //! - `asked`: programmed moves, at random too, and what they mean;
 //! - `compiled`: the pieces of a plan, held against them;
 //! - `driven`: the executed ticks, held against the limits;
-//! - `tolerance`, `limits`, `time`, `modes`, `sections`: the tests.
+//! - `tolerance`, `limits`, `kinks`, `time`, `modes`, `sections`: the tests.
 
 mod asked;
 mod compiled;
 mod driven;
+mod kinks;
 mod limits;
 mod modes;
 mod sections;
@@ -63,7 +64,7 @@ fn judged(
 ) -> Result<(Worst, f64), String> {
     let plan = planned(text, machine)?;
     let stretches = compiled(&plan);
-    continuous(&stretches)?;
+    continuous(&stretches, 3)?;
     let ratio = distance(asked, &stretches, tolerance, samples);
     if ratio > 1.0 + 1e-6 {
         return Err(format!("{ratio} times the tolerance"));

@@ -41,7 +41,7 @@ fn a_blend_keeps_its_tolerance_and_steps_nowhere() {
         let done = || -> Result<f64, String> {
             let plan = planned(&text, &machine)?;
             let stretches = compiled(&plan);
-            continuous(&stretches)?;
+            continuous(&stretches, 3)?;
             let ratio = distance(&asked, &stretches, tolerance, 60);
             blends += usize::from(plan.blocks.iter().any(|block| ["blend", "curve"].contains(&&*block.kind)));
             if ratio > 1.0 + 1e-6 {
@@ -111,7 +111,7 @@ fn merged_chords_keep_the_tolerance() {
             all += asked.len();
             merged += plan.blocks.iter().filter(|block| block.kind != "blend").count();
             let stretches = compiled(&plan);
-            continuous(&stretches)?;
+            continuous(&stretches, 3)?;
             let ratio = distance(&asked, &stretches, tolerance, 24);
             if ratio > 1.0 + 1e-6 { Err(format!("{ratio} times the tolerance")) } else { Ok(ratio) }
         }();
@@ -146,7 +146,7 @@ fn lines_have_both_tolerances() {
                 let moves = plan.blocks.iter().filter(|block| block.kind != "blend").count();
                 *count += moves;
                 let stretches = compiled(&plan);
-                continuous(&stretches)?;
+                continuous(&stretches, 3)?;
                 let distance = tolerance * distance(&asked, &stretches, tolerance, 24);
                 worst = worst.max(distance / (tolerance + merging));
                 beyond += u32::from(distance > 1.01 * tolerance);
