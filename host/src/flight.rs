@@ -106,7 +106,6 @@ pub fn ticks<const N: usize>(rows: &[FlightRow<f64, N>], machine: &Machine<N>) -
             set_mm: axis.set.to_mm(),
             vel_mm_s: axis.velocity_mm_s,
             acc_mm_s2: axis.accel_mm_s2,
-            kink_mm_s2: 0.0,
             jerk_mm_s3: axis.jerk_mm_s3,
             act_mm: axis.set.to_mm() - axis.following_error_mm,
             err_um: axis.following_error_mm * 1e3,

@@ -13,7 +13,7 @@
 //! but a junction without a blend has to gain a five-hundredth of it: G64 asks for smooth motion. Looking at
 //! one junction after the other does not find the best of all; in the end the run is planned with every blend
 //! at its longest and as it was programmed, too, and the best of these is taken. So blends and merged lines
-//! cost at most that part of the time that the exact path takes.
+//! cost at most that part of the time that the exact path takes without its kinks.
 //!
 //! **Tangent junctions** whose curvature jumps are treated alike: passed without a blend they fall under the
 //! acceleration-step limit as under G61, because a path of bounded jerk through them can take longer (on the
@@ -52,7 +52,7 @@ const FLAT_CORNER_RAD: f64 = 75.0 * core::f64::consts::PI / 180.0;
 /// Lengths of blends that are tried, as parts of the longest one.
 const SIZES: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
 /// Lengths of easements that are tried, as parts of what there is room for.
-const EASED: [f64; 2] = [1.0, 0.25];
+const EASEMENT_SIZES: [f64; 2] = [1.0, 0.25];
 /// How much longer than the best found the longest blends may take for others to be tried: these gain up to
 /// an eighth.
 const PROMISING: f64 = 1.15;
@@ -99,6 +99,16 @@ impl<const N: usize> Crossing<N> {
             By::Itself => [0.0; 2],
             By::Easement(eased) => eased.easement.trims_mm,
             By::Blend(rounding) => [rounding.blend.trim_mm; 2],
+        }
+    }
+
+    /// The greatest feed where it begins \[mm/s\].
+    fn enter_mm_s(&self) -> f64 {
+        match (&self.by, self.driven().first()) {
+            (By::Easement(eased), Some(first)) if eased.easement.trims_mm[0] > 0.0 => {
+                first.ceilings.programmed.feed_mm_s
+            }
+            _ => self.feed_mm_s,
         }
     }
 
@@ -177,7 +187,7 @@ pub(super) fn blocks<const N: usize>(
     let as_programmed = if is_merged { Junctions::new(Run::exact(moves), machine)? } else { junctions };
     let most_s = candidates.iter().map(|timed| timed.time_s).fold(f64::INFINITY, f64::min);
     // Before all its kinks are eased: what it takes at least.
-    let exact = if as_programmed.least_exact_s() < most_s {
+    let exact = if as_programmed.least_exact_s() < (1.0 - EXACT_GAIN_MIN) * most_s {
         Some(as_programmed.timed(&as_programmed.exact()?))
     } else {
         None
@@ -334,10 +344,20 @@ impl<'a, const N: usize> Junctions<'a, N> {
 
     /// The rooms of the moves of a junction where the others trim by `trims_mm`.
     fn rooms_mm(&self, junction: usize, trims_mm: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
+        self.run.rooms_mm(junction, self.other_trims_mm(junction, trims_mm))
+    }
+
+    /// The same, at most half of either move.
+    fn halves_mm(&self, junction: usize, trims_mm: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
+        self.run.halves_mm(junction, self.other_trims_mm(junction, trims_mm))
+    }
+
+    /// What trims the moves of a junction at their other ends.
+    fn other_trims_mm(&self, junction: usize, trims_mm: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
         let after = junction + 1;
         let [after_mm, _] = if after < self.run.junctions() { trims_mm(after) } else { [0.0; 2] };
         let [_, before_mm] = junction.checked_sub(1).map_or([0.0; 2], trims_mm);
-        self.run.rooms_mm(junction, [before_mm, after_mm])
+        [before_mm, after_mm]
     }
 
     /// All as they are, but that kinks are eased.
@@ -355,13 +375,12 @@ impl<'a, const N: usize> Junctions<'a, N> {
         Ok(if self.timed(&settled).time_s < self.timed(&exact).time_s { settled } else { exact })
     }
 
-    /// The time that the moves take at least without blends: kinks are passed \[s\].
+    /// The time that the moves take at least without blends, as if kinks that are eased were none \[s\].
     fn least_exact_s(&self) -> f64 {
         let passed = Crossing { by: By::Itself, feed_mm_s: f64::INFINITY };
         let mut blocks = self.blocks(&vec![passed; self.run.junctions()]);
-        for index in 1..blocks.len() {
-            let elements = [&blocks[index - 1].element, &blocks[index].element];
-            blocks[index - 1].junction_mm_s = junction_feed(elements, false, self.machine);
+        for junction in (0..self.run.junctions()).filter(|&junction| self.is_eased(junction)) {
+            blocks[junction].junction_mm_s = f64::INFINITY;
         }
         run_time_s(&blocks, self.machine.tick_s)
     }
@@ -370,7 +389,7 @@ impl<'a, const N: usize> Junctions<'a, N> {
     /// within half of its moves.
     fn exact_at(&self, junction: usize) -> AtLine<Crossing<N>> {
         if self.is_eased(junction) {
-            let eased = self.eased(junction, self.rooms_mm(junction, |_| [f64::INFINITY; 2]))?.into_iter();
+            let eased = self.eased(junction, self.halves_mm(junction, |_| [0.0; 2]))?.into_iter();
             let fastest = eased.max_by(|one, other| one.feed_mm_s.total_cmp(&other.feed_mm_s));
             if let Some(fastest) = fastest {
                 return Ok(fastest);
@@ -400,7 +419,7 @@ impl<'a, const N: usize> Junctions<'a, N> {
         let share = self.machine.path.curve_feed_share;
         let sides = easement.elements.iter().map(|&element| self.driven(junction, element, share));
         let mut sides = sides.collect::<AtLine<Vec<_>>>()?;
-        // All that meets at the joint.
+        // What meets there.
         let [before, after] = [junction, junction + 1].map(|index| &self.run.moves()[index].element);
         let met = match (&easement.elements[..], easement.trims_mm) {
             ([first, second], _) => [first, second],
@@ -408,13 +427,13 @@ impl<'a, const N: usize> Junctions<'a, N> {
             ([only], _) => [before, only],
             _ => [before, after],
         };
-        let joint_mm_s = junction_feed(met, true, self.machine);
-        // Ramps have more of the limits below what they can reach from the joint.
+        let junction_mm_s = junction_feed(met, true, self.machine);
+        // Ramps have more of the limits below what they can reach from the junction.
         let most = [&self.ceilings[junction], &self.ceilings[junction + 1]].into_iter();
         let most = most.chain(sides.iter().map(|side| &side.ceilings)).map(|of| of.greatest.feed_mm_s);
-        let most_mm_s = most.fold(joint_mm_s, f64::min);
-        let most_trim_mm = easement.trims_mm[0].max(easement.trims_mm[1]);
-        let reach_mm_s = (most_mm_s.powi(2) + 2.0 * self.limits.accel_mm_s2 * most_trim_mm).sqrt();
+        let most_mm_s = most.fold(junction_mm_s, f64::min);
+        let trims_mm = easement.trims_mm[0] + easement.trims_mm[1];
+        let reach_mm_s = (most_mm_s.powi(2) + 2.0 * self.limits.accel_mm_s2 * trims_mm).sqrt();
         for side in &mut sides {
             if side.ceilings.programmed.feed_mm_s > reach_mm_s {
                 let reason = side.ceilings.programmed.reason;
@@ -427,10 +446,10 @@ impl<'a, const N: usize> Junctions<'a, N> {
         if easement.trims_mm[0] > 0.0
             && let Some(first) = sides.first_mut()
         {
-            first.end_mm_s = joint_mm_s;
+            first.end_mm_s = junction_mm_s;
         }
         let feeds = sides.iter().map(|side| side.ceilings.programmed.feed_mm_s);
-        let feed_mm_s = feeds.fold(joint_mm_s, f64::min);
+        let feed_mm_s = feeds.fold(junction_mm_s, f64::min);
         Ok(Crossing { feed_mm_s, by: By::Easement(Rc::new(Eased { easement, sides })) })
     }
 
@@ -488,7 +507,7 @@ impl<'a, const N: usize> Junctions<'a, N> {
                 None => None,
             },
         };
-        let mut variants = Vec::with_capacity(2 * SIZES.len() + 3 * EASED.len());
+        let mut variants = Vec::with_capacity(2 * SIZES.len() + 3 * EASEMENT_SIZES.len());
         if let Some(longest) = longest {
             variants.extend(self.shared(junction, &longest)?);
             for &size in &SIZES[1..] {
@@ -509,13 +528,9 @@ impl<'a, const N: usize> Junctions<'a, N> {
         if !self.is_eased(junction) {
             return Ok(Vec::new());
         }
-        let [left_mm, half_mm] = [
-            self.rooms_mm(junction, |junction| chosen[junction].trims_mm()),
-            self.rooms_mm(junction, |_| [f64::INFINITY; 2]),
-        ];
-        let rooms_mm: [f64; 2] = core::array::from_fn(|index| left_mm[index].min(half_mm[index]));
-        let mut all = Vec::with_capacity(3 * EASED.len());
-        for part in EASED {
+        let rooms_mm = self.halves_mm(junction, |junction| chosen[junction].trims_mm());
+        let mut all = Vec::with_capacity(3 * EASEMENT_SIZES.len());
+        for part in EASEMENT_SIZES {
             all.extend(self.eased(junction, rooms_mm.map(|room_mm| part * room_mm))?);
         }
         Ok(all)
@@ -570,7 +585,7 @@ impl<'a, const N: usize> Junctions<'a, N> {
             let ([_, first_mm], [last_mm, _]) = (trims_mm(index.checked_sub(1)), trims_mm(Some(index)));
             let length_mm = self.run.length_mm(index) - first_mm - last_mm;
             let after = crossing(index).filter(|_| index < last);
-            let junction_mm_s = after.map_or(f64::INFINITY, |after| after.feed_mm_s);
+            let junction_mm_s = after.map_or(f64::INFINITY, Crossing::enter_mm_s);
             let block = |length_mm, ceiling: &Ceiling<f64>, junction_mm_s| Block {
                 length_mm,
                 cap_mm_s: ceiling.feed_mm_s,
@@ -638,7 +653,7 @@ fn least([one, other]: [f64; 2]) -> f64 {
 fn common_feeds(windows: &[Vec<Block<f64>>], mut feeds: [f64; 2]) -> [f64; 2] {
     for _ in 0..LOWERINGS {
         let before = feeds;
-        for blocks in windows {
+        for blocks in windows.iter().filter(|blocks| blocks.iter().all(|block| block.length_mm > 0.0)) {
             let mut plans = [BlockPlan::default(); BLOCKS];
             match plan(blocks, feeds[0], feeds[1], &mut plans[..blocks.len()]) {
                 Ok(()) => {}

@@ -17,9 +17,9 @@ use super::outputs::Switches;
 use super::travel;
 use crate::gcode::{Feed, LineMove, Message, Nurbs, PathMode, ProbeMove, Step, StepKind};
 use crate::machine::Machine;
-use crate::toolpath::joint::meet;
 use crate::toolpath::merge::merge;
 use crate::toolpath::smooth::{Move, is_same_run};
+use crate::toolpath::spline_ends::meet;
 use crate::toolpath::{Element, Feeds, SpeedRatios, Vector};
 
 /// Moves of the first section of a program at least, and of the later ones: each has twice as many as the one before, so
@@ -215,10 +215,10 @@ impl<'m, const N: usize> Runs<'m, N> {
     /// Takes moves, up to one that leaves the travel.
     pub(super) fn go(&mut self, moves: impl IntoIterator<Item = Move<N>>) -> AtLine<()> {
         for mut step in moves {
+            travel::check_move(&step.element, self.machine).map_err(|problem| (step.line, problem))?;
             if let Some(before) = self.run.last_mut() {
                 meet(before, &mut step, self.machine.path.junction_angle_rad);
             }
-            travel::check_move(&step.element, self.machine).map_err(|problem| (step.line, problem))?;
             self.run_s += self.time_s(&step);
             self.run.push(step);
             let is_long = self.run.len() > self.section && self.run_s > SECTION_S;

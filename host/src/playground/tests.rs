@@ -84,7 +84,7 @@ fn refusals_name_file_line_and_what_was_found() {
     assert!(far.starts_with("part.ngc: found 1200") && far.contains("no memory for more ticks"), "{far}");
     // An hour of motion is too long, also where it is not absurd.
     let hour = error(&run_of("G21 G90\nG1 X6000 F100\nM2\n", &json!([])));
-    assert!(hour.starts_with("part.ngc: found 3600 s of motion, expected 17"), "{hour}");
+    assert!(hour.starts_with("part.ngc: found 3600 s of motion, expected 19"), "{hour}");
     // The sliders' machine comes with a program that is refused.
     let edit = json!([{"table": "path", "key": "jerk_mm_s3", "value": 9000.0}]);
     for text in ["G1 Q\n", "G21 G90\nG1 X6000 F100\nM2\n"] {

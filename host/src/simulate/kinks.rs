@@ -64,7 +64,7 @@ impl<const N: usize> Kinks<N> {
     /// What those that are passed in a tick add to the acceleration of the axes, at this feed and up to this place \[mm/s²\].
     pub(crate) fn passed(&mut self, (stretch, at): (u64, Position), feed_mm_s: f64, tick_s: f64) -> [f64; N] {
         let mut accel = [0.0; N];
-        while let Some(kink) = self.ahead.pop_if(|kink| (kink.stretch, kink.at) <= (stretch, at)) {
+        while let Some(kink) = self.ahead.pop_if(|kink| (kink.stretch, kink.at) < (stretch, at)) {
             // What was skipped with an aborted stretch was not passed.
             if kink.stretch == stretch {
                 for (accel, turn) in accel.iter_mut().zip(kink.turn) {
@@ -96,6 +96,8 @@ mod tests {
         let mut kinks = Kinks::of(&items);
         assert_eq!(kinks.ahead.len(), 2);
         assert_eq!(kinks.passed((0, mm(9.999)), 50.0, 0.0005), [0.0; 2]);
+        // Where it is reached the piece before still counts.
+        assert_eq!(kinks.passed((0, mm(10.0)), 50.0, 0.0005), [0.0; 2]);
         let [x, y] = kinks.passed((0, mm(10.02)), 50.0, 0.0005);
         assert!((y - 50.0 * sine / 0.0005).abs() < 1e-9 && (x + 50.0 * (1.0 - cosine) / 0.0005).abs() < 1e-9);
         assert_eq!(kinks.passed((0, mm(21.0)), 50.0, 0.0005), [0.0; 2]);

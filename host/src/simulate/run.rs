@@ -229,13 +229,13 @@ impl<'a, R: Real, H: Hardware<N>, const N: usize> Execution<'a, R, H, N> {
         let start_mm = info.starts_mm.get(trace.executed.stretches as usize).copied();
         let start_mm = start_mm.unwrap_or(info.path_length_mm);
         let mut row = trace_row(&trace, start_mm, &mut self.contour);
+        collector.add(&row);
+        self.limit_share.add(&row);
         let at = (u64::from(trace.executed.stretches), trace.executed.motion.s);
         let kinks_mm_s2 = self.kinks.passed(at, row.v_mm_s, header.tick_s);
         for (axis, kink_mm_s2) in row.axes.iter_mut().zip(kinks_mm_s2) {
-            axis.kink_mm_s2 = kink_mm_s2;
+            axis.acc_mm_s2 += kink_mm_s2;
         }
-        collector.add(&row);
-        self.limit_share.add(&row);
         self.probing.tick(&trace);
         self.commands.add(background.given(), &row);
         self.s_mm = row.s_mm;
@@ -319,7 +319,6 @@ pub(crate) fn trace_row<R: Real, const N: usize>(
             set_mm: output.set.to_mm(),
             vel_mm_s: setpoint.velocity_mm_s.to_f64(),
             acc_mm_s2: setpoint.accel_mm_s2.to_f64(),
-            kink_mm_s2: 0.0,
             jerk_mm_s3: setpoint.jerk_mm_s3.to_f64(),
             act_mm: output.actual.to_mm(),
             err_um: output.following_error_mm.to_f64() * 1e3,

@@ -7,14 +7,14 @@
 //!
 //! **Shape.** An element is followed with a bulge b added, towards the inside of the turn φ or away from it. By arc length
 //! tangent, curvature and its derivative begin as the element has them. With w the fraction of the easement's length d, 0
-//! where it begins and 1 at the joint,
+//! where it begins and 1 at the junction,
 //!
 //! ```text
 //! both    b = φ·d·(w⁴/4 − w⁵/10)               b'''' ≤ 6·φ/d³      half of φ on either side
 //! one     b = φ·d·(−1.7·w⁴ + 2.4·w⁵ − 0.7·w⁶)  b'''' ≤ 42·φ/d³     all of φ
 //! ```
 //!
-//! On both sides it is equally long, bends by φ/d more at the joint on either, so that the jump of curvature stays what it
+//! On both sides it is equally long, bends by φ/d more at the junction on either, so that the jump of curvature stays what it
 //! is, and is the farthest from the path there, 0.15·φ·d. On one side it ends where the elements meet, adds 6.6·φ/d to the
 //! jump and is at most 0.095·φ·d off. It is for a long element beside a short one, and beside a curve, which stays.
 
@@ -31,13 +31,15 @@ const ONE: ([f64; DEGREE], f64) = ([0.0, 0.0, 0.0, -1.7, 2.4, -0.7, 0.0], 0.095)
 /// Where a curve of the derivatives at both ends is the farthest from the arc that it follows: its error is nearly u⁴·(1 − u)⁴
 /// times a constant.
 const FARTHEST: f64 = 0.5;
+/// Parts of the longest one that are tried until one is within the tolerance.
+const SHORTER: [f64; 3] = [1.0, 0.5, 0.25];
 
 /// An easement, and the path that it replaces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Easement<const N: usize = 3> {
     /// What takes the place of the ends, in their order.
     pub elements: Vec<Element<N>>,
-    /// Length of path that it replaces before and after the joint \[mm\].
+    /// Length of path that it replaces before and after the junction \[mm\].
     pub trims_mm: [f64; 2],
     /// A bound on its distance from the path and the path's from it \[mm\].
     pub distance_mm: f64,
@@ -62,44 +64,54 @@ impl<const N: usize> Easement<N> {
         let made = kinds.into_iter().filter_map(|((powers, greatest), rooms_mm)| {
             let longest_mm = CLOSE * tolerance_mm / (greatest * norm(turn));
             let trims_mm = rooms_mm.map(|room_mm| room_mm.min(longest_mm));
-            let joint = match trims_mm {
-                [before_mm, after_mm] if before_mm == after_mm => scale(turn, greatest * before_mm),
-                _ => [0.0; N],
-            };
-            let mut elements = Vec::with_capacity(2);
-            let mut off_mm = 0.0_f64;
-            for (index, side) in sides.iter().enumerate() {
-                let (Some(side), trim_mm) = (side, trims_mm[index]) else { continue };
-                // Written so that what is not a number is none either; where the turn is below rounding, it is none.
-                if !(trim_mm.is_finite() && norm(turn) > direction_rounding_rad(trim_mm)) {
-                    continue;
-                }
-                let bulge = Polynomial::new(powers.map(|power| scale(turn, power * trim_mm)));
-                let away = side.at(trim_mm).0;
-                // Without the bulge.
-                let (start, followed, bulge) = match index {
-                    0 => (away, followed(side, [trim_mm, 0.0]), bulge),
-                    _ => ([0.0; N], followed(side, [0.0, trim_mm]), bulge.part(1.0, 0.0)),
-                };
-                let middle = add(start, followed.offset(0.0, FARTHEST));
-                off_mm = off_mm.max(side.near(trim_mm).distance_mm(middle));
-                let (from, to) = if index == 0 { (away, joint) } else { (joint, away) };
-                let shape = followed.plus(&bulge);
-                let (from, to) = (add(point, from), add(point, to));
-                elements.push(Element::Polynomial { from, to, shape, role: Role::Blend });
-            }
-            let distance_mm = off_mm + greatest * norm(turn) * trims_mm[0].max(trims_mm[1]);
-            let is_one = !elements.is_empty() && distance_mm <= tolerance_mm;
-            is_one.then_some(Self { elements, trims_mm, distance_mm })
+            // What is off an arc by itself is less on less of it.
+            SHORTER.into_iter().find_map(|part| {
+                let trims_mm = trims_mm.map(|trim_mm| part * trim_mm);
+                let found = Self::of(point, &sides, turn, trims_mm, (&powers, greatest))?;
+                (found.distance_mm <= tolerance_mm).then_some(found)
+            })
         });
         made.collect()
     }
+
+    /// The easement of `turn` at a point that trims the sides by `trims_mm`, both alike or one by nothing.
+    fn of(
+        point: Vector<N>,
+        sides: &[Option<Side<N>>; 2],
+        turn: Vector<N>,
+        trims_mm: [f64; 2],
+        (powers, greatest): (&[f64; DEGREE], f64),
+    ) -> Option<Self> {
+        let trim_mm = trims_mm[0].max(trims_mm[1]);
+        // Written so that what is not a number is none either. A turn that rounding could be is none.
+        if !(trim_mm > 0.0 && trim_mm.is_finite() && norm(turn) > direction_rounding_rad(trim_mm)) {
+            return None;
+        }
+        let off_mm = greatest * trim_mm * norm(turn);
+        let middle = if trims_mm[0] == trims_mm[1] { scale(turn, greatest * trim_mm) } else { [0.0; N] };
+        let mut elements = Vec::with_capacity(2);
+        let mut follows_mm = 0.0_f64;
+        for (index, side) in sides.iter().enumerate() {
+            let (Some(side), true) = (side, trims_mm[index] > 0.0) else { continue };
+            let bulge = Polynomial::new(powers.map(|power| scale(turn, power * trim_mm)));
+            let away = side.at(trim_mm).0;
+            let (start, followed, bulge, [from, to]) = match index {
+                0 => (away, followed(side, [trim_mm, 0.0]), bulge, [away, middle]),
+                _ => ([0.0; N], followed(side, [0.0, trim_mm]), bulge.part(1.0, 0.0), [middle, away]),
+            };
+            let farthest = add(start, followed.offset(0.0, FARTHEST));
+            follows_mm = follows_mm.max(side.near(trim_mm).distance_mm(farthest));
+            let ([from, to], shape) = ([from, to].map(|end| add(point, end)), followed.plus(&bulge));
+            elements.push(Element::Polynomial { from, to, shape, role: Role::Blend });
+        }
+        (!elements.is_empty()).then_some(Self { elements, trims_mm, distance_mm: off_mm + follows_mm })
+    }
 }
 
-/// A side from one distance from the joint to another, one of which is 0, as a curve of its derivatives at both.
-fn followed<const N: usize>(side: &Side<N>, from_joint_mm: [f64; 2]) -> Polynomial<N> {
-    let length_mm = from_joint_mm[0].max(from_joint_mm[1]);
-    let [start, end] = from_joint_mm.map(|mm| {
+/// A side from one distance from the junction to another, one of which is 0, as a curve of its derivatives at both.
+fn followed<const N: usize>(side: &Side<N>, from_corner_mm: [f64; 2]) -> Polynomial<N> {
+    let length_mm = from_corner_mm[0].max(from_corner_mm[1]);
+    let [start, end] = from_corner_mm.map(|mm| {
         let (point, [tangent, second, third]) = side.at(mm);
         let by_parameter: [Vector<N>; 3] =
             [scale(tangent, length_mm), scale(second, length_mm.powi(2)), scale(third, length_mm.powi(3))];
@@ -161,7 +173,7 @@ mod tests {
     }
 
     /// Random lines and arcs at random kinks: what replaces their ends goes on in one direction throughout, with their curvature
-    /// and its derivative where it begins, with no greater jump at the joint than is said, and is as near as it says.
+    /// and its derivative where it begins, with no greater jump at the junction than is said, and is as near as it says.
     #[test]
     fn a_kink_is_spread_within_room_and_tolerance() {
         let (mut kinds, mut bound) = ([0; 2], 0.0_f64);

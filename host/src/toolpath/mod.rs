@@ -15,7 +15,7 @@
 //!   lines to fewer lines and arcs, and `dense`: runs
 //!   of short lines and arcs to curves, by
 //!   [`fairing`]: the curve that bends least within a tolerance;
-//! - `joint`: programmed curves that meet at a kink;
+//! - `spline_ends`: programmed curves that meet at a kink;
 //! - [`septic`]: curves to pieces of degree seven in arc length, with checked error;
 //! - [`greatest`]: how curves and their pieces bend at their tightest;
 //! - [`speeds`]: the speeds of the axes on an element, and what feed a program allows along it;
@@ -35,7 +35,6 @@ pub mod element;
 pub mod fairing;
 pub mod greatest;
 pub mod involute;
-pub(crate) mod joint;
 pub mod merge;
 pub mod polynomial;
 pub mod rational;
@@ -44,6 +43,7 @@ mod short;
 pub mod smooth;
 pub mod speeds;
 pub mod spline;
+pub(crate) mod spline_ends;
 pub mod subspace;
 
 pub use compile::{CompileError, Placed, compile, exact, on_path, septics};
@@ -57,18 +57,34 @@ pub use speeds::{Feeds, SpeedRatios};
 /// A point or a vector of a machine's space: a coordinate for each of its axes, in their order \[mm\].
 pub type Vector<const N: usize = 3> = [f64; N];
 
-pub(crate) fn add<const N: usize>(a: Vector<N>, b: Vector<N>) -> Vector<N> {
-    core::array::from_fn(|axis| a[axis] + b[axis])
+// Loops, not `from_fn` and `map`: these are not inlined in a build without optimisation across units, and most of the time of
+// planning goes into them then.
+
+#[inline]
+pub(crate) fn add<const N: usize>(mut a: Vector<N>, b: Vector<N>) -> Vector<N> {
+    for (a, b) in a.iter_mut().zip(&b) {
+        *a += b;
+    }
+    a
 }
 
-pub(crate) fn subtract<const N: usize>(a: Vector<N>, b: Vector<N>) -> Vector<N> {
-    core::array::from_fn(|axis| a[axis] - b[axis])
+#[inline]
+pub(crate) fn subtract<const N: usize>(mut a: Vector<N>, b: Vector<N>) -> Vector<N> {
+    for (a, b) in a.iter_mut().zip(&b) {
+        *a -= b;
+    }
+    a
 }
 
-pub(crate) fn scale<const N: usize>(a: Vector<N>, factor: f64) -> Vector<N> {
-    a.map(|component| component * factor)
+#[inline]
+pub(crate) fn scale<const N: usize>(mut a: Vector<N>, factor: f64) -> Vector<N> {
+    for component in &mut a {
+        *component *= factor;
+    }
+    a
 }
 
+#[inline]
 pub(crate) fn dot<const N: usize>(a: Vector<N>, b: Vector<N>) -> f64 {
     let mut sum = a[0] * b[0];
     for axis in 1..N {
@@ -81,6 +97,7 @@ pub(crate) fn cross(a: Vector, b: Vector) -> Vector {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
+#[inline]
 pub(crate) fn norm<const N: usize>(a: Vector<N>) -> f64 {
     dot(a, a).sqrt()
 }

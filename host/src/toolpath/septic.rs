@@ -256,16 +256,16 @@ impl<const N: usize> Septic<N> {
     /// Offset from the start and derivative by arc length at u = s/length.
     #[must_use]
     pub fn at(&self, u: f64) -> (Vector<N>, Vector<N>) {
-        let horner = |axis: usize| {
+        let (mut offset, mut tangent) = ([0.0; N], [0.0; N]);
+        for ((offset, tangent), coefficients) in offset.iter_mut().zip(&mut tangent).zip(&self.coefficients) {
             let (mut value, mut slope) = (0.0, 0.0);
-            for c in self.coefficients[axis].iter().rev() {
+            for c in coefficients.iter().rev() {
                 slope = slope * u + value;
                 value = value * u + c;
             }
-            (value * u, slope * u + value)
-        };
-        let both: [(f64, f64); N] = core::array::from_fn(horner);
-        (both.map(|(value, _)| value), both.map(|(_, slope)| slope / self.length_mm))
+            (*offset, *tangent) = (value * u, (slope * u + value) / self.length_mm);
+        }
+        (offset, tangent)
     }
 
     /// Second to fourth derivative by arc length at u = s/length.

@@ -31,6 +31,9 @@ pub(super) const TAKEN_MAX: f64 = 0.9;
 /// Part of the tolerance that short lines are merged within.
 const MERGED_SHARE: f64 = 0.6;
 
+/// What blends and easements leave of an element, or take of it, is some part of it, more than this.
+const LEFT_MIN: f64 = 0.1;
+
 /// Directions computed from coordinates that are exact to 10⁻¹⁰ mm agree to this where they are meant to
 /// \[rad\]; curvatures agree to the same part of themselves.
 pub const TANGENT_ROUNDING_RAD: f64 = 1.0e-9;
@@ -105,10 +108,7 @@ impl<const N: usize> Run<N> {
         Self::of(moves.to_vec(), vec![0.0; moves.len()], Vec::new())
     }
 
-    fn of(moves: Vec<Move<N>>, mut distances_mm: Vec<f64>, greatest: Vec<Option<Greatest<N>>>) -> Self {
-        for (distance_mm, step) in distances_mm.iter_mut().zip(&moves) {
-            *distance_mm = distance_mm.max(step.distance_mm);
-        }
+    fn of(moves: Vec<Move<N>>, distances_mm: Vec<f64>, greatest: Vec<Option<Greatest<N>>>) -> Self {
         let lengths_mm = moves.iter().map(|step| step.element.length_mm()).collect();
         Self { moves, lengths_mm, distances_mm, greatest }
     }
@@ -141,8 +141,9 @@ impl<const N: usize> Run<N> {
     /// How far a move is from those that it stands for, over its tolerance.
     #[must_use]
     pub fn tolerance_share(&self, index: usize) -> f64 {
-        let Move { tolerance_mm, merging_mm, .. } = self.moves[index];
+        let Move { tolerance_mm, merging_mm, distance_mm, .. } = self.moves[index];
         share(self.distances_mm[index], merging_mm.unwrap_or(tolerance_mm))
+            .max(share(distance_mm, tolerance_mm))
     }
 
     /// The same of what rounds a junction and is so far from its moves: what they are off adds to it.
@@ -195,6 +196,17 @@ impl<const N: usize> Run<N> {
     pub fn taken_mm_max(&self, index: usize) -> f64 {
         let is_end = index == 0 || index + 1 == self.moves.len();
         self.lengths_mm[index] * if is_end { 0.5 * TAKEN_MAX } else { TAKEN_MAX }
+    }
+
+    /// What is left of the two moves of a junction where their other ends are trimmed by `trims_mm` \[mm\], at most half of what
+    /// is there.
+    #[must_use]
+    pub fn halves_mm(&self, junction: usize, [before_mm, after_mm]: [f64; 2]) -> [f64; 2] {
+        let half_mm = |index: usize, other_mm: f64| {
+            let left_mm = self.taken_mm_max(index) - other_mm;
+            left_mm.min(0.5 * TAKEN_MAX * self.lengths_mm[index]).max(0.0)
+        };
+        [half_mm(junction, before_mm), half_mm(junction + 1, after_mm)]
     }
 
     /// The greatest trims of the two moves of a junction where what is at their other ends trims them by
@@ -323,8 +335,9 @@ impl Room {
 pub(crate) fn kink_rad<const N: usize>([before, after]: [&Element<N>; 2]) -> Option<f64> {
     let kink_rad = angle(before.ends()[1].tangent, after.ends()[0].tangent);
     // Lengths may take a quadrature.
-    let is_kink = kink_rad > TANGENT_ROUNDING_RAD
-        && kink_rad > direction_rounding_rad(before.length_mm().min(after.length_mm()));
+    let shorter_mm = || before.length_mm().min(after.length_mm());
+    let is_kink =
+        kink_rad > TANGENT_ROUNDING_RAD && kink_rad > direction_rounding_rad(LEFT_MIN * shorter_mm());
     is_kink.then_some(kink_rad)
 }
 

@@ -32,7 +32,7 @@ pub struct AxisColumn {
 pub const AXIS_COLUMNS: [AxisColumn; 7] = [
     axis_column("set", |unit| unit.name().to_owned(), POSITION, |tick| tick.set_mm),
     axis_column("vel", |unit| format!("{}_s", unit.name()), VELOCITY, |tick| tick.vel_mm_s),
-    axis_column("acc", |unit| format!("{}_s2", unit.name()), CHANGE, |tick| tick.acc_mm_s2 + tick.kink_mm_s2),
+    axis_column("acc", |unit| format!("{}_s2", unit.name()), CHANGE, |tick| tick.acc_mm_s2),
     axis_column("jerk", |unit| format!("{}_s3", unit.name()), CHANGE, |tick| tick.jerk_mm_s3),
     axis_column("act", |unit| unit.name().to_owned(), POSITION, |tick| tick.act_mm),
     axis_column("err", |unit| unit.thousandth_name().to_owned(), ERROR, |tick| tick.err_um),

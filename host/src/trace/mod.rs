@@ -216,11 +216,8 @@ pub struct AxisTick {
     pub set_mm: f64,
     /// Set velocity \[mm/s\].
     pub vel_mm_s: f64,
-    /// Set acceleration \[mm/s²\].
+    /// Set acceleration \[mm/s²\]; in a run with what a kink of the path that this tick passes steps velocity by, over the tick.
     pub acc_mm_s2: f64,
-    /// What a kink of the path that this tick passes steps velocity by, over the tick \[mm/s²\]; 0 elsewhere, and where
-    /// the path is not at hand.
-    pub kink_mm_s2: f64,
     /// Set jerk \[mm/s³\].
     pub jerk_mm_s3: f64,
     /// Actual position from the encoder \[mm\].

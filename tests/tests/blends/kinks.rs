@@ -12,12 +12,16 @@ use motion_tests::random::Random;
 /// Programs of many moves.
 const PROGRAMS: u64 = 120;
 
-/// Lines and arcs that go on nearly as the one before did, some of which turn a corner or do not turn at all.
-fn kinked(random: &mut Random, moves: usize, length_mm: f64) -> Vec<Asked> {
-    let (mut at, mut heading, mut asked) = ([0.0; 3], [1.0, 0.0, 0.0], Vec::new());
+/// Lines and arcs that go on nearly as the one before did, some of which turn a corner or do not turn at all; and the number of
+/// corners.
+fn kinked(random: &mut Random, moves: usize, length_mm: f64) -> (Vec<Asked>, usize) {
+    let (mut at, mut heading, mut asked, mut corners) = ([0.0; 3], [1.0, 0.0, 0.0], Vec::new(), 0);
     for _ in 0..moves {
         let angle = match random.below(8) {
-            0 => random.between(0.05, 2.5),
+            0 => {
+                corners += 1;
+                random.between(0.05, 2.5)
+            }
             1 => 0.0,
             _ => random.log(1e-7, 8.7e-3),
         };
@@ -26,7 +30,7 @@ fn kinked(random: &mut Random, moves: usize, length_mm: f64) -> Vec<Asked> {
         (at, heading) = (step.to(), step.heading());
         asked.push(step);
     }
-    asked
+    (asked, corners)
 }
 
 /// Random paths full of kinks, on machines with any limit of the acceleration step: within a tolerance the direction of the path
@@ -41,7 +45,7 @@ fn velocity_steps_nowhere_within_a_tolerance() {
         machine.path.pulse = machine::pulse(&random);
         machine.path.accel_step_mm_s2 = random.log(10.0, 500.0);
         let (moves, length_mm) = (4 + random.below(20), random.log(0.05, 20.0));
-        let asked = kinked(&mut random, moves, length_mm);
+        let (asked, corners) = kinked(&mut random, moves, length_mm);
         let tolerance = rounded(random.log(1e-3, 0.1));
         let text = program(&asked, tolerance, random.log(300.0, 6000.0));
         let done = || -> Result<(), String> {
@@ -49,6 +53,9 @@ fn velocity_steps_nowhere_within_a_tolerance() {
             let stretches = compiled(&plan);
             continuous(&stretches, 1)?;
             stops += stretches.len() - 1;
+            if stretches.len() > corners + 1 {
+                return Err(format!("{} stops at {corners} corners", stretches.len() - 1));
+            }
             let ratio = distance(&asked, &stretches, tolerance, 24);
             worst_distance = worst_distance.max(ratio);
             let found = driven::<f64>(&plan, &machine)?;
@@ -114,7 +121,7 @@ fn rounded_to_three_decimals(random: &mut Random) -> String {
 /// of 4000 was seed 3100.
 const WORST_SEED: u64 = 3100;
 const RATIO_MAX: f64 = 1.1;
-const RATIO_MEAN: f64 = 1.01;
+const RATIO_MEAN: f64 = 1.004;
 
 #[test]
 fn rounded_programs_take_hardly_longer_than_with_steps() {
