@@ -33,6 +33,7 @@ use motion_kernel::plan::{
 
 use super::Mode;
 use super::ceilings::{Ceilings, along, ceilings, in_any_direction, junction_feed};
+use super::crossing::{By, Crossing, Driven, Eased, Rounding};
 use super::error::AtLine;
 use super::lookahead::lookahead;
 use super::stretch::StretchBlock;
@@ -66,108 +67,6 @@ const BLOCKS: usize = 3 * (2 * BESIDE + 2) - 2;
 const LOWERINGS: usize = 8;
 /// Feeds that a plan has named as just possible, made a little less.
 const LESS: f64 = 1.0 - 1.0e-9;
-
-/// How a junction is crossed.
-#[derive(Clone, Debug, PartialEq)]
-struct Crossing<const N: usize> {
-    by: By<N>,
-    /// The greatest feed \[mm/s\].
-    feed_mm_s: f64,
-}
-
-/// What takes the place of a junction.
-#[derive(Clone, Debug, PartialEq)]
-enum By<const N: usize> {
-    /// Nothing.
-    Itself,
-    /// A kink's turn is spread over the ends of its moves.
-    Easement(Rc<Eased<N>>),
-    /// A blend.
-    Blend(Rc<Rounding<N>>),
-}
-
-impl<const N: usize> From<Rounding<N>> for Crossing<N> {
-    fn from(rounding: Rounding<N>) -> Self {
-        Self { feed_mm_s: rounding.driven.ceilings.programmed.feed_mm_s, by: By::Blend(Rc::new(rounding)) }
-    }
-}
-
-impl<const N: usize> Crossing<N> {
-    /// Its trims of the move before and the move after \[mm\].
-    fn trims_mm(&self) -> [f64; 2] {
-        match &self.by {
-            By::Itself => [0.0; 2],
-            By::Easement(eased) => eased.easement.trims_mm,
-            By::Blend(rounding) => [rounding.blend.trim_mm; 2],
-        }
-    }
-
-    /// The greatest feed where it begins \[mm/s\].
-    fn enter_mm_s(&self) -> f64 {
-        match (&self.by, self.driven().first()) {
-            (By::Easement(eased), Some(first)) if eased.easement.trims_mm[0] > 0.0 => {
-                first.ceilings.programmed.feed_mm_s
-            }
-            _ => self.feed_mm_s,
-        }
-    }
-
-    /// What it is driven as.
-    fn driven(&self) -> &[Driven<N>] {
-        match &self.by {
-            By::Itself => &[],
-            By::Easement(eased) => &eased.sides,
-            By::Blend(rounding) => core::slice::from_ref(&rounding.driven),
-        }
-    }
-
-    /// How far that is from the moves \[mm\].
-    fn distance_mm(&self) -> f64 {
-        match &self.by {
-            By::Itself => 0.0,
-            By::Easement(eased) => eased.easement.distance_mm,
-            By::Blend(rounding) => rounding.blend.distance_mm,
-        }
-    }
-
-    fn blend(&self) -> Option<&Rc<Rounding<N>>> {
-        match &self.by {
-            By::Blend(rounding) => Some(rounding),
-            By::Itself | By::Easement(_) => None,
-        }
-    }
-}
-
-/// An easement with what planning knows of it.
-#[derive(Clone, Debug, PartialEq)]
-struct Eased<const N: usize> {
-    easement: Easement<N>,
-    sides: Vec<Driven<N>>,
-}
-
-/// A polynomial between moves with what planning knows of it.
-#[derive(Clone, Debug, PartialEq)]
-struct Driven<const N: usize> {
-    element: Element<N>,
-    length_mm: f64,
-    greatest: Greatest<N>,
-    ratios: SpeedRatios,
-    ceilings: Ceilings,
-    /// The greatest feed at its end \[mm/s\].
-    end_mm_s: f64,
-}
-
-/// A blend with what planning knows of it.
-#[derive(Clone, Debug, PartialEq)]
-struct Rounding<const N: usize> {
-    blend: Blend<N>,
-    /// The room that it was made for \[mm\], of which its size is a part.
-    room_mm: f64,
-    size: f64,
-    /// The part of what its curvature allows with which it is driven.
-    share: f64,
-    driven: Driven<N>,
-}
 
 /// The blocks of a run that starts and ends at rest; the junction feed of the last one is 0. An error comes
 /// with the program line.

@@ -11,7 +11,8 @@
 //!
 //! - `runs`: steps to runs of moves: where motion must stop, and where long runs are cut;
 //! - `sections`: several runs smoothed at once;
-//! - `blending`: stretches to blocks: the choice of the junctions that are blended;
+//! - `blending`: stretches to blocks: the choice of the junctions that are blended, and `crossing`: how one
+//!   is crossed;
 //! - [`outputs`]: spindle and coolant: what the machine switches;
 //! - `ceilings`: the ceiling of a move or a blend, and of a junction;
 //! - `curves`: programmed curves to moves;
@@ -34,6 +35,7 @@ pub mod blocks;
 mod blending;
 mod ceilings;
 mod compiled;
+mod crossing;
 mod curves;
 mod density;
 mod items;
