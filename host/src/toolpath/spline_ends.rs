@@ -21,18 +21,19 @@ const TURN: ([f64; DEGREE], f64) = ([0.0, 0.0, 0.0, -15.0, 39.0, -34.0, 10.0], 0
 /// Turns the ends of programmed curves at a kink of at most `kink_max_rad`, if the path may be changed and the tolerances
 /// allow it.
 pub(crate) fn meet<const N: usize>(before: &mut Move<N>, after: &mut Move<N>, kink_max_rad: f64) {
-    let is_smoothed = before.tolerance_mm.min(after.tolerance_mm) > 0.0;
-    let is_kink =
-        kink_rad([&before.element, &after.element]).is_some_and(|kink_rad| kink_rad <= kink_max_rad);
-    if !(is_smoothed && is_kink) {
+    // Most moves are lines and arcs, and nothing of them is computed.
+    let are_curves = [&before.element, &after.element].map(is_curve);
+    if are_curves == [false; 2] || before.tolerance_mm.min(after.tolerance_mm) <= 0.0 {
+        return;
+    }
+    if kink_rad([&before.element, &after.element]).is_none_or(|kink_rad| kink_rad > kink_max_rad) {
         return;
     }
     let (end, start) = (before.element.ends()[1].tangent, after.element.ends()[0].tangent);
-    let common = match [&before.element, &after.element].map(is_curve) {
+    let common = match are_curves {
         [true, true] => scale(add(end, start), 1.0 / norm(add(end, start))),
         [true, false] => start,
-        [false, true] => end,
-        [false, false] => return,
+        [false, _] => end,
     };
     if let (Some(one), Some(other)) = (turned(before, 1.0, common), turned(after, 0.0, common)) {
         (*before, *after) = (one, other);
