@@ -1,15 +1,15 @@
 //! Bounds on where an accelerating ramp passes a feed.
 //!
 //! Consumes a ramp, then feeds; produces two lengths between which [`Ramp::length_to_feed_mm`] lies, at a
-//! fraction of its cost: no division, two square roots, up to the end of an opening edge. Background:
-//! the planner of spanning ramps uses it for every ceiling that a ramp may pass.
+//! fraction of its cost: two square roots in an opening edge, one and a division on the plateau, three divisions in
+//! a closing edge. Background: the planner of spanning ramps uses it for every ceiling that a ramp may pass.
 
 use super::Ramp;
 use super::pulse::JerkPulse;
-use super::shape::{ABOUT_WITHIN, Shape};
+use super::shape::{ABOUT_MISSING_WITHIN, ABOUT_WITHIN, Shape};
 use crate::work;
 
-/// Relative rounding of the length where the formula is exact: all but the arches.
+/// Relative rounding of the length where the formula is exact: in the hold and on plateaus.
 const EXACT_WITHIN: f64 = 1.0e-12;
 
 /// The values of a ramp that are the same for every feed it passes.
@@ -32,6 +32,8 @@ pub struct Passing {
     arch_mm: f64,
     /// One over the scale of its feeds \[s/mm\].
     per_arch: f64,
+    /// The feed gained up to which there is a plateau, and from which on the closing edge follows \[mm/s\].
+    plateau_mm_s: f64,
 }
 
 impl Passing {
@@ -54,6 +56,7 @@ impl Passing {
             arch_s,
             arch_mm: scale_mm_s * arch_s,
             per_arch: 1.0 / scale_mm_s,
+            plateau_mm_s: pulse.speed_mm_s() - pulse.closing_mm_s(),
         }
     }
 
@@ -82,9 +85,22 @@ impl Passing {
             let (x, length) = Shape::<f64>::about_where_speed_is(near * self.per_arch);
             let (straight_mm, curve_mm) = (end_mm_s * (self.arch_s * x), self.arch_mm * length);
             (straight_mm, curve_mm, straight_mm * ABOUT_WITHIN[0] + curve_mm * ABOUT_WITHIN[1])
-        } else {
+        } else if near <= self.plateau_mm_s {
             let (at_s, curve_mm) = self.pulse.where_speed_is(near);
             (end_mm_s * at_s, curve_mm, self.length_mm * EXACT_WITHIN)
+        } else {
+            let (accel, missing) = (self.pulse.accel_mm_s2(), self.pulse_mm_s - near);
+            let (x, length) = Shape::<f64>::about_where_missing_is(
+                missing * self.per_arch,
+                accel * self.arch_s * self.per_arch,
+            );
+            let left_s = self.arch_s * x;
+            let left_mm = left_s * (self.pulse_mm_s - 0.5 * accel * left_s) + self.arch_mm * length;
+            let straight_mm = end_mm_s * (self.pulse.duration_s - left_s);
+            let [time, of_length] = ABOUT_MISSING_WITHIN;
+            let rounding_mm = self.length_mm * EXACT_WITHIN;
+            let slack_mm = feed_mm_s * left_s * time + self.arch_mm * of_length + rounding_mm;
+            (straight_mm, self.pulse_mm - left_mm, slack_mm)
         };
         let about_mm =
             if is_near_start { straight_mm + curve_mm } else { self.length_mm - (straight_mm - curve_mm) };

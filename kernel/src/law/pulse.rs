@@ -79,6 +79,11 @@ impl<R: Root> JerkPulse<R> {
         R::from_f64(0.5) * self.accel_mm_s2() * moment
     }
 
+    /// The feed gained in its closing edge: what acceleration gains at its peak, less what it is below that.
+    pub(super) fn closing_mm_s(&self) -> R {
+        self.accel_mm_s2() * self.edge_s - self.gained(&Shape::middle()).v_mm_s
+    }
+
     /// What is gained `t_s` after its start, 0 … its length.
     pub(super) fn at(&self, t_s: R) -> FeedState<R> {
         let left_s = self.duration_s - t_s;

@@ -43,6 +43,32 @@ pub(super) const ABOUT_WITHIN: [f64; 2] = [1.0e-4, 6.0e-4];
 const ABOUT_TIME: [f64; 5] = [0.742_574_33, 0.131_734_09, 0.080_664_49, -0.031_184_95, 0.076_290_74];
 const ABOUT_LENGTH: [f64; 5] = [0.049_999_16, 0.010_402_43, 0.004_873_61, 0.002_285_99, 0.003_136_08];
 
+/// Errors of [`Shape::about_where_missing_is`]: of the time, relative, and of the length, absolute.
+pub(super) const ABOUT_MISSING_WITHIN: [f64; 2] = [1.0e-4, 1.0e-6];
+/// The feed gained in an edge over x⁴, its slope over x³ and its integral over x⁵, as powers of x²: the first terms of their
+/// series.
+const EDGE_SPEED: [f64; 5] = {
+    let square = core::f64::consts::PI * core::f64::consts::PI;
+    let fourth = square * square;
+    [
+        square / 12.0,
+        -fourth / 90.0,
+        fourth * square / 1260.0,
+        -fourth * fourth / 28_350.0,
+        fourth * fourth * square / 935_550.0,
+    ]
+};
+const EDGE_ACCEL: [f64; 5] = {
+    let [a, b, c, d, e] = EDGE_SPEED;
+    [4.0 * a, 6.0 * b, 8.0 * c, 10.0 * d, 12.0 * e]
+};
+const EDGE_LENGTH: [f64; 5] = {
+    let [a, b, c, d, e] = EDGE_SPEED;
+    [a / 5.0, b / 7.0, c / 9.0, d / 11.0, e / 13.0]
+};
+/// The first of them nearly, as one number, for a first guess.
+const EDGE_SPEED_MEAN: f64 = 0.66;
+
 /// The law's shapes at one normalised time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shape<U> {
@@ -105,6 +131,25 @@ impl<U: Unit> Shape<U> {
         };
         let x = w.sqrt() * polynomial(&ABOUT_TIME);
         (x, x * w * w * polynomial(&ABOUT_LENGTH))
+    }
+
+    /// In a closing edge that ends with the acceleration `accel`, 1/2 and more: about the time that is left where
+    /// `missing` of the feed is still to be gained, and the length that an edge gains in that time, to the errors
+    /// [`ABOUT_MISSING_WITHIN`].
+    ///
+    /// With S(x) the feed that an edge gains, `missing` = `accel`·x − S(x): two Newton steps, the first with a rough S.
+    pub(super) fn about_where_missing_is(missing: f64, accel: f64) -> (f64, f64) {
+        let series = |coefficients: &[f64; 5], square: f64| {
+            coefficients.iter().rev().fold(0.0, |sum, &coefficient| sum * square + coefficient)
+        };
+        let alone = missing / accel;
+        let rough = EDGE_SPEED_MEAN * alone * alone * alone;
+        let x = alone + rough * alone / (accel - 4.0 * rough);
+        let (square, cube) = (x * x, x * x * x);
+        let (speed, slope) = (cube * x * series(&EDGE_SPEED, square), cube * series(&EDGE_ACCEL, square));
+        let x = x + (missing - accel * x + speed) / (accel - slope);
+        let square = x * x;
+        (x, square * square * x * series(&EDGE_LENGTH, square))
     }
 
     /// The shapes at `z` in \[0, 1/2\]: an edge. In the tick.
@@ -229,6 +274,21 @@ mod tests {
         }
         println!("time, length: {worst:?}");
         assert!(worst[0] < ABOUT_WITHIN[0] && worst[1] < ABOUT_WITHIN[1], "{worst:?}");
+    }
+
+    /// The estimate in a closing edge: what it was made from is found again, whatever the acceleration at its end.
+    #[test]
+    fn about_where_a_speed_is_missing() {
+        let mut worst = [0.0_f64; 2];
+        for (step, i) in (0..=60).flat_map(|step| (1..=2000).map(move |i| (step, i))) {
+            let (accel, x) = (0.5 * 1.2_f64.powi(step), 0.5 * f64::from(i) / 2000.0);
+            let shape = Shape::at(x);
+            let (about, length) = Shape::<f64>::about_where_missing_is(accel * x - shape.speed, accel);
+            worst[0] = worst[0].max((about / x - 1.0).abs());
+            worst[1] = worst[1].max((length - Shape::at(about.min(0.5)).length).abs());
+        }
+        println!("time, length: {worst:?}");
+        assert!(worst[0] < ABOUT_MISSING_WITHIN[0] && worst[1] < ABOUT_MISSING_WITHIN[1], "{worst:?}");
     }
 
     /// f64 against the closed forms, which are good where they don't cancel.
