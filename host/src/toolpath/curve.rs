@@ -1,6 +1,7 @@
 //! Derivatives of a curve: by its parameter, and by arc length.
 
-use super::{Vector, add, dot, norm, scale, subtract};
+use super::lanes::LANES;
+use super::{Lanes, Vector, add, dot, norm, scale, subtract};
 
 /// A smooth curve with a parameter.
 pub trait Curve<const N: usize = 3> {
@@ -15,26 +16,42 @@ pub trait Curve<const N: usize = 3> {
         norm(self.derivatives(u)[0])
     }
 
+    /// The same at several places.
+    fn speeds(&self, places: [f64; LANES]) -> [f64; LANES] {
+        places.map(|u| self.speed(u))
+    }
+
     /// Arc length from `a` to `b` \[mm\], `b` ≥ `a`. The default integrates |r'| by 16 Gauss points, which
     /// resolves a turn of up to an eighth of a circle to the last place.
     fn length(&self, a: f64, b: f64) -> f64 {
-        gauss(a, b, |u| self.speed(u))
+        gauss(self, a, b)
     }
 }
 
-/// The integral of `function` from `a` to `b` by 16 Gauss points.
-pub(super) fn gauss(a: f64, b: f64, function: impl Fn(f64) -> f64) -> f64 {
-    let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-    let sum: f64 =
-        GAUSS_16.iter().map(|(x, w)| w * (function(middle - half * x) + function(middle + half * x))).sum();
-    half * sum
+/// Arc length from `a` to `b` by 16 Gauss points \[mm\].
+pub(super) fn gauss<const N: usize>(curve: &(impl Curve<N> + ?Sized), a: f64, b: f64) -> f64 {
+    by_points(curve, a, b, &GAUSS_16)
 }
 
 /// The same by 4 points.
-pub(super) fn gauss_4(a: f64, b: f64, function: impl Fn(f64) -> f64) -> f64 {
+pub(super) fn gauss_4<const N: usize>(curve: &(impl Curve<N> + ?Sized), a: f64, b: f64) -> f64 {
+    by_points(curve, a, b, &GAUSS_4)
+}
+
+fn by_points<const N: usize>(
+    curve: &(impl Curve<N> + ?Sized),
+    a: f64,
+    b: f64,
+    points: &[[(f64, f64); LANES / 2]],
+) -> f64 {
     let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));
-    let sum: f64 =
-        GAUSS_4.iter().map(|(x, w)| w * (function(middle - half * x) + function(middle + half * x))).sum();
+    let mut sum = 0.0;
+    for &[(x, w), (next_x, next_w)] in points {
+        let places = [-x, x, -next_x, next_x].map(|x| middle + half * x);
+        let [low, high, next_low, next_high] = curve.speeds(places);
+        sum += w * (low + high);
+        sum += next_w * (next_low + next_high);
+    }
     half * sum
 }
 
@@ -48,7 +65,7 @@ pub(super) fn refined_length<const N: usize>(
     agree: &impl Fn(f64, f64) -> bool,
 ) -> f64 {
     let middle = 0.5 * (a + b);
-    let length = |a, b| gauss(a, b, |u| curve.speed(u));
+    let length = |a, b| gauss(curve, a, b);
     let (left, right) = (length(a, middle), length(middle, b));
     let both = left + right;
     if halvings == 0 || agree(both, whole_mm) || !both.is_finite() {
@@ -62,18 +79,19 @@ pub(super) fn refined_length<const N: usize>(
 ///
 /// With σ = |r'|: t = r'/σ, κn = (r'' − t·(t·r''))/σ², and the third from the derivative of that.
 #[must_use]
-pub fn by_arc_length<const N: usize>([d1, d2, d3]: [Vector<N>; 3]) -> [Vector<N>; 3] {
+pub(crate) fn by_arc_length<T: Lanes, const N: usize>([d1, d2, d3]: [[T; N]; 3]) -> [[T; N]; 3] {
+    let one = T::of(1.0);
     let speed = norm(d1);
-    let tangent = scale(d1, 1.0 / speed);
+    let tangent = scale(d1, one / speed);
     // s' = σ, s'' = t·r'', s''' = t·r''' + |r''⊥|²/σ
     let s2 = dot(tangent, d2);
     let across = subtract(d2, scale(tangent, s2));
     let s3 = dot(tangent, d3) + dot(across, across) / speed;
     // r'' = x''σ² + x's'',  r''' = x'''σ³ + 3x''σs'' + x's'''
-    let second = scale(across, 1.0 / (speed * speed));
+    let second = scale(across, one / (speed * speed));
     let third = scale(
-        subtract(subtract(d3, scale(second, 3.0 * speed * s2)), scale(tangent, s3)),
-        1.0 / (speed * speed * speed),
+        subtract(subtract(d3, scale(second, T::of(3.0) * speed * s2)), scale(tangent, s3)),
+        one / (speed * speed * speed),
     );
     [tangent, second, third]
 }
@@ -83,37 +101,40 @@ pub fn by_arc_length<const N: usize>([d1, d2, d3]: [Vector<N>; 3]) -> [Vector<N>
 /// With σ, s2, s3, s4 the derivatives of the arc length: r4 = x4·σ⁴ + 6x3·σ²·s2 + x2·(4σ·s3 + 3s2²) + t·s4,
 /// and t·x4 = −3x2·x3 because |t| = 1.
 #[must_use]
-pub fn four_by_arc_length<const N: usize>([d1, d2, d3, d4]: [Vector<N>; 4]) -> [Vector<N>; 4] {
+pub(crate) fn four_by_arc_length<T: Lanes, const N: usize>([d1, d2, d3, d4]: [[T; N]; 4]) -> [[T; N]; 4] {
     let speed = norm(d1);
     let [tangent, second, third] = by_arc_length([d1, d2, d3]);
     let square = speed * speed;
     let s2 = dot(tangent, d2);
     let s3 = dot(tangent, d3) + dot(second, second) * square * speed;
     let rest = subtract(
-        subtract(d4, scale(third, 6.0 * square * s2)),
-        scale(second, 4.0 * speed * s3 + 3.0 * s2 * s2),
+        subtract(d4, scale(third, T::of(6.0) * square * s2)),
+        scale(second, T::of(4.0) * speed * s3 + T::of(3.0) * s2 * s2),
     );
     let across = subtract(rest, scale(tangent, dot(tangent, rest)));
-    let fourth = add(scale(across, 1.0 / (square * square)), scale(tangent, -3.0 * dot(second, third)));
+    let fourth =
+        add(scale(across, T::of(1.0) / (square * square)), scale(tangent, T::of(-3.0) * dot(second, third)));
     [tangent, second, third, fourth]
 }
 
 /// Positive abscissae and weights of the 4-point Gauss–Legendre rule.
-const GAUSS_4: [(f64, f64); 2] = [
+const GAUSS_4: [[(f64, f64); LANES / 2]; 1] = [[
     (0.339_981_043_584_856_26, 0.652_145_154_862_546_1),
     (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
-];
+]];
 
 /// Positive abscissae and weights of the 16-point Gauss–Legendre rule.
-const GAUSS_16: [(f64, f64); 8] = [
-    (0.095_012_509_837_637_44, 0.189_450_610_455_068_5),
-    (0.281_603_550_779_258_9, 0.182_603_415_044_923_6),
-    (0.458_016_777_657_227_4, 0.169_156_519_395_002_54),
-    (0.617_876_244_402_643_7, 0.149_595_988_816_576_73),
-    (0.755_404_408_355_003, 0.124_628_971_255_533_87),
-    (0.865_631_202_387_831_7, 0.095_158_511_682_492_78),
-    (0.944_575_023_073_232_6, 0.062_253_523_938_647_89),
-    (0.989_400_934_991_649_9, 0.027_152_459_411_754_095),
+const GAUSS_16: [[(f64, f64); LANES / 2]; 4] = [
+    [(0.095_012_509_837_637_44, 0.189_450_610_455_068_5), (0.281_603_550_779_258_9, 0.182_603_415_044_923_6)],
+    [
+        (0.458_016_777_657_227_4, 0.169_156_519_395_002_54),
+        (0.617_876_244_402_643_7, 0.149_595_988_816_576_73),
+    ],
+    [(0.755_404_408_355_003, 0.124_628_971_255_533_87), (0.865_631_202_387_831_7, 0.095_158_511_682_492_78)],
+    [
+        (0.944_575_023_073_232_6, 0.062_253_523_938_647_89),
+        (0.989_400_934_991_649_9, 0.027_152_459_411_754_095),
+    ],
 ];
 
 /// An arc, helix or spiral: the angle is the parameter; radius, height and all axes besides go linearly with it.

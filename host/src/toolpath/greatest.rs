@@ -6,7 +6,9 @@
 //! and its pieces.
 
 use motion_kernel::plan::Bend;
+use wide::f64x4;
 
+use super::lanes::LANES;
 use super::septic::Septic;
 use super::{Vector, norm};
 
@@ -54,10 +56,12 @@ fn greater(a: f64, b: f64) -> f64 {
 /// |r''|, |r'''| and |r''''| of a piece, each where it is greatest.
 fn of_piece<const N: usize>(piece: &Septic<N>) -> [f64; 3] {
     let mut peaks = [Peak::default(); 3];
-    for part in 0..=PIECE_PARTS {
-        let derivatives = piece.second_to_fourth(part as f64 / PIECE_PARTS as f64);
+    for first in (0..=PIECE_PARTS).step_by(LANES) {
+        let places = core::array::from_fn(|lane| (first + lane) as f64 / PIECE_PARTS as f64);
+        let derivatives = piece.second_to_fourth(f64x4::from(places));
         for (peak, derivative) in peaks.iter_mut().zip(derivatives) {
-            peak.next(norm(derivative));
+            let norms = norm(derivative).to_array();
+            norms.iter().take(PIECE_PARTS + 1 - first).for_each(|&norm| peak.next(norm));
         }
     }
     peaks.map(Peak::greatest)

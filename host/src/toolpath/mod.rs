@@ -19,6 +19,7 @@
 //! - [`septic`]: curves to pieces of degree seven in arc length, with checked error;
 //! - [`greatest`]: how curves and their pieces bend at their tightest;
 //! - [`speeds`]: the speeds of the axes on an element, and what feed a program allows along it;
+//! - `lanes`: numbers four at once;
 //! - [`subspace`]: what moves in few coordinates, in these;
 //! - [`mod@compile`]: elements to pieces over exact path positions.
 //!
@@ -35,6 +36,7 @@ pub mod element;
 pub mod fairing;
 pub mod greatest;
 pub mod involute;
+mod lanes;
 pub mod merge;
 pub mod polynomial;
 pub mod rational;
@@ -51,6 +53,7 @@ pub(crate) use element::from_xyz;
 pub use element::{Element, NoAxis, Role};
 pub use greatest::Greatest;
 pub use involute::Involute;
+pub(crate) use lanes::Lanes;
 pub use polynomial::Polynomial;
 pub use speeds::{Feeds, SpeedRatios};
 
@@ -61,31 +64,31 @@ pub type Vector<const N: usize = 3> = [f64; N];
 // planning goes into them then.
 
 #[inline]
-pub(crate) fn add<const N: usize>(mut a: Vector<N>, b: Vector<N>) -> Vector<N> {
-    for (a, b) in a.iter_mut().zip(&b) {
+pub(crate) fn add<T: Lanes, const N: usize>(mut a: [T; N], b: [T; N]) -> [T; N] {
+    for (a, &b) in a.iter_mut().zip(&b) {
         *a += b;
     }
     a
 }
 
 #[inline]
-pub(crate) fn subtract<const N: usize>(mut a: Vector<N>, b: Vector<N>) -> Vector<N> {
-    for (a, b) in a.iter_mut().zip(&b) {
+pub(crate) fn subtract<T: Lanes, const N: usize>(mut a: [T; N], b: [T; N]) -> [T; N] {
+    for (a, &b) in a.iter_mut().zip(&b) {
         *a -= b;
     }
     a
 }
 
 #[inline]
-pub(crate) fn scale<const N: usize>(mut a: Vector<N>, factor: f64) -> Vector<N> {
+pub(crate) fn scale<T: Lanes, const N: usize>(mut a: [T; N], factor: T) -> [T; N] {
     for component in &mut a {
-        *component *= factor;
+        *component = *component * factor;
     }
     a
 }
 
 #[inline]
-pub(crate) fn dot<const N: usize>(a: Vector<N>, b: Vector<N>) -> f64 {
+pub(crate) fn dot<T: Lanes, const N: usize>(a: [T; N], b: [T; N]) -> T {
     let mut sum = a[0] * b[0];
     for axis in 1..N {
         sum += a[axis] * b[axis];
@@ -98,7 +101,7 @@ pub(crate) fn cross(a: Vector, b: Vector) -> Vector {
 }
 
 #[inline]
-pub(crate) fn norm<const N: usize>(a: Vector<N>) -> f64 {
+pub(crate) fn norm<T: Lanes, const N: usize>(a: [T; N]) -> T {
     dot(a, a).sqrt()
 }
 

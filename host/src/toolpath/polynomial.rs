@@ -8,10 +8,12 @@
 
 use motion_kernel::internals::add_work;
 use motion_kernel::plan::Bend;
+use wide::f64x4;
 
 use super::curve::{Curve, four_by_arc_length, gauss, refined_length};
 use super::greatest::{Greatest, Peak, bend};
-use super::{Vector, add, norm, scale, subtract};
+use super::lanes::LANES;
+use super::{Lanes, Vector, add, norm, scale, subtract};
 
 /// Highest power.
 pub const DEGREE: usize = 7;
@@ -105,8 +107,13 @@ impl<const N: usize> Polynomial<N> {
     /// First to fourth derivative by the parameter at `u`.
     #[must_use]
     pub fn four_derivatives(&self, u: f64) -> [Vector<N>; 4] {
-        let [c1, c2, c3, c4, ..] = self.first_about(u, 4);
-        [c1, scale(c2, 2.0), scale(c3, 6.0), scale(c4, 24.0)]
+        if u == 0.0 { four(self.coefficients) } else { four(first_about(self.coefficients, u, 4)) }
+    }
+
+    /// The same at several places.
+    fn four_derivatives_at(&self, places: [f64; LANES]) -> [[f64x4; N]; 4] {
+        let coefficients = self.coefficients.map(|coefficient| coefficient.map(f64x4::of));
+        four(first_about(coefficients, f64x4::from(places), 4))
     }
 
     /// The greatest derivatives by arc length of the curve itself, from 64 parts.
@@ -138,37 +145,46 @@ impl<const N: usize> Polynomial<N> {
     fn norms(&self, parts: usize, mut each: impl FnMut(Vector<N>, Vector<N>)) -> [f64; 3] {
         add_work(parts);
         let mut norms = [Peak::default(); 3];
-        for part in 0..=parts {
-            let [tangent, second, third, fourth] =
-                four_by_arc_length(self.four_derivatives(part as f64 / parts as f64));
-            for (peak, derivative) in norms.iter_mut().zip([second, third, fourth]) {
-                peak.next(norm(derivative));
+        for first in (0..=parts).step_by(LANES) {
+            let places = core::array::from_fn(|lane| (first + lane).min(parts) as f64 / parts as f64);
+            let [tangent, second, third, fourth] = four_by_arc_length(self.four_derivatives_at(places));
+            let of_these = [second, third, fourth].map(|derivative| norm(derivative).to_array());
+            let (tangent, second) = (tangent.map(f64x4::to_array), second.map(f64x4::to_array));
+            for lane in 0..LANES.min(parts + 1 - first) {
+                for (peak, norms) in norms.iter_mut().zip(&of_these) {
+                    peak.next(norms[lane]);
+                }
+                each(tangent.map(|lanes| lanes[lane]), second.map(|lanes| lanes[lane]));
             }
-            each(tangent, second);
         }
         norms.map(Peak::greatest)
     }
 
     /// The coefficients of the same curve in u − `origin`, relative to the point at `origin`.
     fn about(&self, origin: f64) -> [Vector<N>; DEGREE] {
-        self.first_about(origin, DEGREE)
+        if origin == 0.0 { self.coefficients } else { first_about(self.coefficients, origin, DEGREE) }
     }
+}
 
-    /// The first `count` of them; the others mean nothing.
-    fn first_about(&self, origin: f64, count: usize) -> [Vector<N>; DEGREE] {
-        let mut shifted = self.coefficients;
-        if origin == 0.0 {
-            return shifted;
+/// Of a curve with these coefficients, the first `count` in u − `origin`; the others mean nothing.
+fn first_about<T: Lanes, const N: usize>(
+    mut coefficients: [[T; N]; DEGREE],
+    origin: T,
+    count: usize,
+) -> [[T; N]; DEGREE] {
+    // Horner's scheme, applied to its own results. Its first pass makes the point itself, which is left
+    // out, and the second c₁ at index 0.
+    for pass in 0..DEGREE.min(count + 1) {
+        for index in (pass.saturating_sub(1)..DEGREE - 1).rev() {
+            coefficients[index] = add(coefficients[index], scale(coefficients[index + 1], origin));
         }
-        // Horner's scheme, applied to its own results. Its first pass makes the point itself, which is left
-        // out, and the second c₁ at index 0.
-        for pass in 0..DEGREE.min(count + 1) {
-            for index in (pass.saturating_sub(1)..DEGREE - 1).rev() {
-                shifted[index] = add(shifted[index], scale(shifted[index + 1], origin));
-            }
-        }
-        shifted
     }
+    coefficients
+}
+
+/// First to fourth derivative where the curve has these coefficients.
+fn four<T: Lanes, const N: usize>([c1, c2, c3, c4, ..]: [[T; N]; DEGREE]) -> [[T; N]; 4] {
+    [c1, scale(c2, T::of(2.0)), scale(c3, T::of(6.0)), scale(c4, T::of(24.0))]
 }
 
 impl<const N: usize> Curve<N> for Polynomial<N> {
@@ -190,8 +206,18 @@ impl<const N: usize> Curve<N> for Polynomial<N> {
         norm(slope)
     }
 
+    fn speeds(&self, places: [f64; LANES]) -> [f64; LANES] {
+        let u = f64x4::from(places);
+        let mut slope = [f64x4::of(0.0); N];
+        for (index, &coefficient) in self.coefficients.iter().enumerate().rev() {
+            let of_power = scale(coefficient, (index + 1) as f64).map(f64x4::of);
+            slope = add(scale(slope, u), of_power);
+        }
+        norm(slope).to_array()
+    }
+
     fn length(&self, a: f64, b: f64) -> f64 {
-        let whole_mm = gauss(a, b, |u| self.speed(u));
+        let whole_mm = gauss(self, a, b);
         let agree = |both: f64, whole: f64| (both - whole).abs() <= LENGTH_TOLERANCE * both;
         refined_length(self, [a, b], whole_mm, HALVINGS_MAX, &agree)
     }
@@ -249,6 +275,28 @@ mod tests {
             let found = scale(subtract(third(after), third(before)), 1.0 / curve.length(u - h, u + h));
             let [.., exact] = four_by_arc_length([d1, d2, d3, d4]);
             assert!(norm(subtract(exact, found)) < 1e-6 * (1.0 + norm(exact)), "{exact:?} {found:?}");
+        }
+    }
+
+    /// Four places at once have the bits that each has by itself.
+    #[test]
+    fn lanes_have_the_bits_of_one() {
+        let curve = curve();
+        for first in 0..50 {
+            let places: [f64; LANES] =
+                core::array::from_fn(|lane| 0.019 * f64::from(first) + 0.011 * lane as f64);
+            let (speeds, four) = (curve.speeds(places), curve.four_derivatives_at(places));
+            let by_length = four_by_arc_length(four);
+            for (lane, &u) in places.iter().enumerate() {
+                let alone = curve.four_derivatives(u);
+                let alone_by_length = four_by_arc_length(alone);
+                assert_eq!(speeds[lane].to_bits(), curve.speed(u).to_bits());
+                for (order, axis) in (0..4).flat_map(|order| (0..3).map(move |axis| (order, axis))) {
+                    let bits = |of: &[[f64x4; 3]; 4]| of[order][axis].to_array()[lane].to_bits();
+                    assert_eq!(bits(&four), alone[order][axis].to_bits(), "{u}");
+                    assert_eq!(bits(&by_length), alone_by_length[order][axis].to_bits(), "{u}");
+                }
+            }
         }
     }
 

@@ -250,7 +250,7 @@ impl Curve for Rational {
     }
 
     fn length(&self, a: f64, b: f64) -> f64 {
-        let whole_mm = gauss(a, b, |u| self.speed(u));
+        let whole_mm = gauss(self, a, b);
         let error_mm = LENGTH_TOLERANCE * whole_mm;
         let agree = |both: f64, whole: f64| (both - whole).abs() <= error_mm;
         refined_length(self, [a, b], whole_mm, HALVINGS_MAX, &agree)

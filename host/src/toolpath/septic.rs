@@ -4,8 +4,8 @@
 //! halved until position and feed agree with the curve between them too, and says how well they do. A
 //! curve that no reasonable number of pieces follows is refused, and its cusp named if that is why.
 
-use super::Vector;
 use super::curve::{Curve, by_arc_length, gauss_4};
+use super::{Lanes, Vector};
 use super::{norm, subtract};
 
 /// Greatest distance of a piece from its curve \[mm\]: a hundredth of a 0.1 µm count.
@@ -229,7 +229,7 @@ fn deviation<const N: usize>(curve: &(impl Curve<N> + ?Sized), piece: &Septic<N>
     for part in 1..8 {
         let parameter = a + (b - a) * f64::from(part) / 8.0;
         // An eighth is so smooth that few points are better than the deviations that are looked for.
-        gone_mm += gauss_4(before, parameter, |u| curve.speed(u));
+        gone_mm += gauss_4(curve, before, parameter);
         before = parameter;
         let u = gone_mm / piece.length_mm;
         let (point, slope) = piece.at(u);
@@ -269,19 +269,18 @@ impl<const N: usize> Septic<N> {
     }
 
     /// Second to fourth derivative by arc length at u = s/length.
-    #[must_use]
-    pub fn second_to_fourth(&self, u: f64) -> [Vector<N>; 3] {
+    pub(crate) fn second_to_fourth<T: Lanes>(&self, u: T) -> [[T; N]; 3] {
         let per_mm = 1.0 / self.length_mm;
-        let mut derivatives = [[0.0; N]; 3];
+        let mut derivatives = [[T::of(0.0); N]; 3];
         let mut per_power = per_mm;
         for (index, (derivative, factors)) in derivatives.iter_mut().zip(&FACTORS).enumerate() {
             per_power *= per_mm;
             for (component, coefficients) in derivative.iter_mut().zip(&self.coefficients) {
-                let mut sum = 0.0;
+                let mut sum = T::of(0.0);
                 for power in (index + 1..coefficients.len()).rev() {
-                    sum = sum * u + coefficients[power] * factors[power];
+                    sum = sum * u + T::of(coefficients[power] * factors[power]);
                 }
-                *component = sum * per_power;
+                *component = sum * T::of(per_power);
             }
         }
         derivatives
