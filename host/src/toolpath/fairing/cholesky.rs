@@ -29,6 +29,11 @@ impl<const N: usize> Cholesky<N> {
         self.columns.fill([[0.0; N]; ACTING]);
     }
 
+    /// Makes it the other, which has as many points.
+    pub(super) fn copy(&mut self, other: &Self) {
+        self.columns.copy_from_slice(&other.columns);
+    }
+
     /// Adds a symmetric `N` × `N` matrix to the blocks of all pairs of [`ACTING`] points from `first` on, times the
     /// factors of both.
     pub(super) fn add(&mut self, first: usize, factors: &[f64; ACTING], matrix: &[Vector<N>; N]) {
@@ -74,7 +79,8 @@ impl<const N: usize> Cholesky<N> {
             }
             let pivot = column[0].sqrt();
             column[0] = pivot;
-            column[1..].iter_mut().for_each(|entry| *entry /= pivot);
+            let per_pivot = 1.0 / pivot;
+            column[1..].iter_mut().for_each(|entry| *entry *= per_pivot);
             // What is left of the matrix loses the product of this column with itself.
             for (below, other) in (1..Self::WIDTH).zip(rest) {
                 let factor = column[below];

@@ -387,28 +387,30 @@ impl<const N: usize> Window<'_, N> {
         let ahead = shapes.len().min(kept + GOES_ON);
         let behind =
             deviation::deviations(guide, &breaks[kept..=ahead], &shapes[kept..ahead], &mut walk.clone());
-        // What is not a number is too far, and what is near enough can't be driven.
-        let tightened = |share: f64| if share <= 1.0 { BELOW } else { (BELOW / share).max(TIGHTENED_MIN) };
-        let (mut spans, mut far) = (Vec::with_capacity(kept), Vec::new());
+        // What is not a number is too far.
+        let too_far = |(index, deviation): (usize, &deviation::Deviation)| {
+            (!(deviation.share <= 1.0)).then(|| (index, (BELOW / deviation.share).max(TIGHTENED_MIN)))
+        };
+        let far: TooFar = deviations.iter().chain(&behind).enumerate().filter_map(too_far).collect();
+        if !far.is_empty() {
+            return Err(far);
+        }
+        let (mut spans, mut not_driven) = (Vec::with_capacity(kept), Vec::new());
         // It starts and ends exactly where the path does.
         let end = guide.parts[guide.parts.len() - 1].element.ends_mm().1;
         for (index, ((from, shape), ends)) in shapes[..kept].iter().zip(breaks.windows(2)).enumerate() {
             let parts = (guide.part_at(ends[0]), guide.part_at(ends[1]));
-            let deviation = deviations[index];
+            let distance_mm = deviations[index].distance_mm;
             let from = if index == 0 { self.start.point[0] } else { *from };
             let to: Vector<N> = shapes.get(index + 1).map_or(end, |next| next.0);
             let element = Element::Polynomial { from, to, shape: *shape, role: Role::Curve };
             match element.greatest_driven() {
-                Ok(greatest) if deviation.share <= 1.0 => {
-                    spans.push(Span { element, parts, distance_mm: deviation.distance_mm, greatest });
-                }
-                _ => far.push((index, tightened(deviation.share))),
+                Ok(greatest) => spans.push(Span { element, parts, distance_mm, greatest }),
+                Err(_) => not_driven.push((index, BELOW)),
             }
         }
-        let too_far = (kept..).zip(&behind).filter(|(_, deviation)| !(deviation.share <= 1.0));
-        far.extend(too_far.map(|(index, deviation)| (index, tightened(deviation.share))));
-        if !far.is_empty() {
-            return Err(far);
+        if !not_driven.is_empty() {
+            return Err(not_driven);
         }
         let point = match (shapes.get(kept), shapes[..kept].last()) {
             (Some((point, _)), Some((_, shape))) => {

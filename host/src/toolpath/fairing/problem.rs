@@ -39,9 +39,11 @@ struct Sample<const N: usize> {
     first: usize,
     row: Row,
     at: Vector<N>,
+    /// How far the curve is from it \[mm\].
+    off: Vector<N>,
     /// 1/tolerance² \[1/mm²\].
     per_square: f64,
-    /// The slack variable, above 0: with [`Problem::square`] it makes 1, and what it is off by is the
+    /// The slack variable, above 0: with [`Self::square`] it makes 1, and what it is off by is the
     /// constraint violation.
     slack: f64,
     /// The multiplier: the cost that a little more tolerance would save.
@@ -56,10 +58,16 @@ impl<const N: usize> Sample<N> {
             first: span - DEGREE,
             row: row(knots, DEGREE, span, mm, 0),
             at,
+            off: [0.0; N],
             per_square,
             slack: 1.0,
             multiplier: 1.0,
         }
+    }
+
+    /// The square of the curve's distance from it, in units of its tolerance: at most 1 within it.
+    fn square(&self) -> f64 {
+        self.per_square * dot(self.off, self.off)
     }
 }
 
@@ -69,9 +77,10 @@ struct Bending {
     length_mm: f64,
     /// What the square of each derivative costs at each point.
     factors: [[f64; 3]; GAUSS.len()],
-    /// Σ factor·row·rowᵀ.
-    gram: [[f64; ACTING]; ACTING],
 }
+
+/// Second to fourth derivative at the points of the quadrature on one span.
+type Bent<const N: usize> = [[Vector<N>; 3]; GAUSS.len()];
 
 /// The problem and where its solution stands.
 pub(super) struct Problem<'a, const N: usize> {
@@ -81,8 +90,12 @@ pub(super) struct Problem<'a, const N: usize> {
     samples: Vec<Sample<N>>,
     bendings: Vec<Bending>,
     control: Vec<Vector<N>>,
+    /// How the curve of these control points bends on each span.
+    bent: Vec<Bent<N>>,
     /// Control points that the end has decided.
     decided_at_end: usize,
+    /// What bending adds to the equations, Σ factor·row·rowᵀ of all points, at these costs.
+    of_bending: Cholesky<N>,
     equations: Cholesky<N>,
 }
 
@@ -117,13 +130,16 @@ impl<'a, const N: usize> Problem<'a, N> {
                 }),
                 length_mm: ends[1] - ends[0],
                 factors: [[0.0; 3]; GAUSS.len()],
-                gram: [[0.0; ACTING]; ACTING],
             })
-            .collect();
+            .collect::<Vec<_>>();
         let samples = samples(guide, breaks, &knots, end.is_none());
         let decided_at_end = if end.is_some() { DECIDED } else { 0 };
-        let equations = Cholesky::new(points);
-        Self { breaks, knots, samples, bendings, control, decided_at_end, equations }
+        let bent = vec![[[[0.0; N]; 3]; GAUSS.len()]; bendings.len()];
+        let [of_bending, equations] = [(); 2].map(|()| Cholesky::new(points));
+        let mut problem =
+            Self { breaks, knots, samples, bendings, control, bent, decided_at_end, of_bending, equations };
+        problem.measure();
+        problem
     }
 
     /// The ends of the spans \[mm\].
@@ -133,7 +149,8 @@ impl<'a, const N: usize> Problem<'a, N> {
 
     /// Sets what bending costs where: the limits, at the feeds that are expected on the spans \[mm/s\].
     fn set_costs(&mut self, limits: &Limits<f64>, feeds_mm_s: &[f64]) {
-        for (bending, &feed) in self.bendings.iter_mut().zip(feeds_mm_s) {
+        self.of_bending.clear();
+        for (span, (bending, &feed)) in self.bendings.iter_mut().zip(feeds_mm_s).enumerate() {
             let square = feed * feed;
             let units = [
                 square / limits.accel_mm_s2,
@@ -152,48 +169,61 @@ impl<'a, const N: usize> Problem<'a, N> {
                     }
                 }
             }
-            bending.gram = gram;
+            for (a, row) in gram.iter().enumerate() {
+                for (b, &entry) in row.iter().enumerate().take(a + 1) {
+                    self.of_bending.add_unit(span + a, span + b, entry);
+                }
+            }
         }
     }
 
-    /// Second to fourth derivative at a point of the quadrature on a span.
-    fn bent(&self, span: usize, rows: &[Row; 3]) -> [Vector<N>; 3] {
-        let acting = &self.control[span..span + ACTING];
-        // Relative to one of them, so that nothing is lost far from the origin.
-        rows.map(|row| {
-            let terms = acting.iter().zip(row);
-            terms.fold([0.0; N], |sum, (&c, factor)| add(sum, scale(subtract(c, acting[2]), factor)))
-        })
+    /// Takes note of how the curve of the control points bends, and of how far it is from the samples.
+    fn measure(&mut self) {
+        for sample in &mut self.samples {
+            let acting = &self.control[sample.first..sample.first + ACTING];
+            let mut off = subtract(acting[2], sample.at);
+            for (&control, &factor) in acting.iter().zip(&sample.row) {
+                off = add(off, scale(subtract(control, acting[2]), factor));
+            }
+            sample.off = off;
+        }
+        for (span, (bending, bent)) in self.bendings.iter().zip(&mut self.bent).enumerate() {
+            let acting = &self.control[span..span + ACTING];
+            // Relative to one of them, so that nothing is lost far from the origin.
+            let mut from = [[0.0; N]; ACTING];
+            for (from, &control) in from.iter_mut().zip(acting) {
+                *from = subtract(control, acting[2]);
+            }
+            for (rows, bent) in bending.rows.iter().zip(bent) {
+                for (row, derivative) in rows.iter().zip(bent) {
+                    *derivative = [0.0; N];
+                    for (&from, &factor) in from.iter().zip(row) {
+                        *derivative = add(*derivative, scale(from, factor));
+                    }
+                }
+            }
+        }
     }
 
     /// What bending costs.
     pub(super) fn cost(&self) -> f64 {
         let mut sum = 0.0;
-        for (span, bending) in self.bendings.iter().enumerate() {
-            for (rows, factors) in bending.rows.iter().zip(&bending.factors) {
-                for (derivative, factor) in self.bent(span, rows).into_iter().zip(factors) {
-                    sum += factor * dot(derivative, derivative);
-                }
+        for (bending, bent) in self.bendings.iter().zip(&self.bent) {
+            for (derivative, factor) in bent.iter().flatten().zip(bending.factors.iter().flatten()) {
+                sum += factor * dot(*derivative, *derivative);
             }
         }
         0.5 * sum
     }
 
-    fn distance(&self, sample: &Sample<N>) -> Vector<N> {
-        let acting = &self.control[sample.first..sample.first + ACTING];
-        let offset = subtract(acting[2], sample.at);
-        let terms = acting.iter().zip(sample.row);
-        terms.fold(offset, |sum, (&c, factor)| add(sum, scale(subtract(c, acting[2]), factor)))
-    }
-
     /// The greatest distance of the curve from a sample, in units of its tolerance.
     pub(super) fn farthest(&self) -> f64 {
-        self.samples.iter().map(|sample| self.square(sample)).fold(0.0, f64::max).sqrt()
+        self.samples.iter().map(Sample::square).fold(0.0, f64::max).sqrt()
     }
 
     /// The spans where the curve is farther from a sample than so many of its tolerances.
     pub(super) fn tight(&self, tolerances: f64) -> Vec<usize> {
-        let is_far = |sample: &&Sample<N>| self.square(sample) > tolerances * tolerances;
+        let is_far = |sample: &&Sample<N>| sample.square() > tolerances * tolerances;
         let mut spans: Vec<usize> = self.samples.iter().filter(is_far).map(|sample| sample.first).collect();
         spans.dedup();
         spans
@@ -211,12 +241,6 @@ impl<'a, const N: usize> Problem<'a, N> {
         self.restart();
     }
 
-    /// The square of the distance from a sample, in units of its tolerance: at most 1 within it.
-    fn square(&self, sample: &Sample<N>) -> f64 {
-        let e = self.distance(sample);
-        sample.per_square * dot(e, e)
-    }
-
     /// Starts where the curve is, for the limits at these feeds, with a duality gap as great as the cost.
     pub(super) fn start(&mut self, limits: &Limits<f64>, feeds_mm_s: &[f64]) {
         self.set_costs(limits, feeds_mm_s);
@@ -225,10 +249,9 @@ impl<'a, const N: usize> Problem<'a, N> {
 
     fn restart(&mut self) {
         let per_sample = self.cost().max(f64::MIN_POSITIVE) / self.samples.len() as f64;
-        for index in 0..self.samples.len() {
-            let slack = SLACK_MIN.max(1.0 - self.square(&self.samples[index]));
-            self.samples[index].slack = slack;
-            self.samples[index].multiplier = per_sample / slack;
+        for sample in &mut self.samples {
+            sample.slack = SLACK_MIN.max(1.0 - sample.square());
+            sample.multiplier = per_sample / sample.slack;
         }
     }
 
@@ -253,27 +276,22 @@ impl<'a, const N: usize> Problem<'a, N> {
     pub(super) fn step(&mut self, gap_aim: f64) -> Option<f64> {
         add_work(self.bendings.len() + self.samples.len());
         let per_sample = gap_aim / self.samples.len() as f64;
-        self.equations.clear();
+        self.equations.copy(&self.of_bending);
         let mut slope = vec![[0.0; N]; self.control.len()];
-        for (span, bending) in self.bendings.iter().enumerate() {
-            for (rows, factors) in bending.rows.iter().zip(&bending.factors) {
-                for ((row, derivative), factor) in rows.iter().zip(self.bent(span, rows)).zip(factors) {
-                    for (slope, entry) in slope[span..].iter_mut().zip(row) {
-                        *slope = subtract(*slope, scale(derivative, factor * entry));
-                    }
-                }
-            }
-            for (a, row) in bending.gram.iter().enumerate() {
-                for (b, &entry) in row.iter().enumerate().take(a + 1) {
-                    self.equations.add_unit(span + a, span + b, entry);
+        for (span, (bending, bent)) in self.bendings.iter().zip(&self.bent).enumerate() {
+            let rows = bending.rows.iter().flatten();
+            for ((row, derivative), factor) in
+                rows.zip(bent.iter().flatten()).zip(bending.factors.iter().flatten())
+            {
+                for (slope, entry) in slope[span..].iter_mut().zip(row) {
+                    *slope = subtract(*slope, scale(*derivative, factor * entry));
                 }
             }
         }
         let mut pushes = Vec::with_capacity(self.samples.len());
         for sample in &self.samples {
-            let e = self.distance(sample);
-            let pulled = scale(e, 2.0 * sample.per_square);
-            let violation = sample.per_square * dot(e, e) - 1.0 + sample.slack;
+            let pulled = scale(sample.off, 2.0 * sample.per_square);
+            let violation = sample.square() - 1.0 + sample.slack;
             let (linear, square) =
                 (2.0 * sample.multiplier * sample.per_square, sample.multiplier / sample.slack);
             let push = per_sample / sample.slack + square * violation;
@@ -319,9 +337,9 @@ impl<'a, const N: usize> Problem<'a, N> {
         for (control, &step) in self.control.iter_mut().zip(&step) {
             *control = add(*control, scale(step, part));
         }
-        for (index, (slack_change, multiplier_change)) in changes.into_iter().enumerate() {
-            let within = 1.0 - self.square(&self.samples[index]);
-            let sample = &mut self.samples[index];
+        self.measure();
+        for (sample, (slack_change, multiplier_change)) in self.samples.iter_mut().zip(changes) {
+            let within = 1.0 - sample.square();
             sample.slack = (sample.slack + part * slack_change).max(within);
             let balanced = per_sample / sample.slack;
             sample.multiplier = (sample.multiplier + multiplier_part * multiplier_change)
@@ -332,16 +350,16 @@ impl<'a, const N: usize> Problem<'a, N> {
 
     /// The feed at which each span alone keeps the limits \[mm/s\].
     pub(super) fn allowed_mm_s(&self, limits: &Limits<f64>) -> Vec<f64> {
-        let of_span = |(span, bending): (usize, &Bending)| {
+        let of_span = |bent: &Bent<N>| {
             let mut greatest = [0.0_f64; 3];
-            for rows in &bending.rows {
-                for (greatest, derivative) in greatest.iter_mut().zip(self.bent(span, rows)) {
+            for derivatives in bent {
+                for (greatest, &derivative) in greatest.iter_mut().zip(derivatives) {
                     *greatest = greatest.max(norm(derivative));
                 }
             }
             feed_within(limits, greatest)
         };
-        self.bendings.iter().enumerate().map(of_span).collect()
+        self.bent.iter().map(of_span).collect()
     }
 
     /// Start and shape of each span.
