@@ -6,9 +6,8 @@
 use std::rc::Rc;
 
 use super::ceilings::Ceilings;
-use crate::toolpath::blend::Blend;
+use super::shapes::{Bent, Blended};
 use crate::toolpath::easement::Easement;
-use crate::toolpath::{Element, Greatest, SpeedRatios};
 
 /// How a junction is crossed.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,19 +28,13 @@ pub(super) enum By<const N: usize> {
     Blend(Rc<Rounding<N>>),
 }
 
-impl<const N: usize> From<Rounding<N>> for Crossing<N> {
-    fn from(rounding: Rounding<N>) -> Self {
-        Self { feed_mm_s: rounding.driven.ceilings.programmed.feed_mm_s, by: By::Blend(Rc::new(rounding)) }
-    }
-}
-
 impl<const N: usize> Crossing<N> {
     /// Its trims of the move before and the move after \[mm\].
     pub(super) fn trims_mm(&self) -> [f64; 2] {
         match &self.by {
             By::Itself => [0.0; 2],
             By::Easement(eased) => eased.easement.trims_mm,
-            By::Blend(rounding) => [rounding.blend.trim_mm; 2],
+            By::Blend(rounding) => [rounding.blended.blend.trim_mm; 2],
         }
     }
 
@@ -69,7 +62,7 @@ impl<const N: usize> Crossing<N> {
         match &self.by {
             By::Itself => 0.0,
             By::Easement(eased) => eased.easement.distance_mm,
-            By::Blend(rounding) => rounding.blend.distance_mm,
+            By::Blend(rounding) => rounding.blended.blend.distance_mm,
         }
     }
 
@@ -84,30 +77,31 @@ impl<const N: usize> Crossing<N> {
 /// An easement with what planning knows of it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Eased<const N: usize> {
-    pub(super) easement: Easement<N>,
+    pub(super) easement: Rc<Easement<N>>,
     pub(super) sides: Vec<Driven<N>>,
 }
 
 /// A polynomial between moves with what planning knows of it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Driven<const N: usize> {
-    pub(super) element: Element<N>,
-    pub(super) length_mm: f64,
-    pub(super) greatest: Greatest<N>,
-    pub(super) ratios: SpeedRatios,
+    pub(super) bent: Rc<Bent<N>>,
     pub(super) ceilings: Ceilings,
     /// The greatest feed at its end \[mm/s\].
     pub(super) end_mm_s: f64,
 }
 
 /// A blend with what planning knows of it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(super) struct Rounding<const N: usize> {
-    pub(super) blend: Blend<N>,
-    /// The room that it was made for \[mm\], of which its size is a part.
-    pub(super) room_mm: f64,
-    pub(super) size: f64,
+    pub(super) blended: Rc<Blended<N>>,
     /// The part of what its curvature allows with which it is driven.
     pub(super) share: f64,
     pub(super) driven: Driven<N>,
+}
+
+/// What is driven follows from these.
+impl<const N: usize> PartialEq for Rounding<N> {
+    fn eq(&self, other: &Self) -> bool {
+        self.share == other.share && self.blended.blend == other.blended.blend
+    }
 }

@@ -11,8 +11,8 @@
 //!
 //! - `runs`: steps to runs of moves: where motion must stop, and where long runs are cut;
 //! - `sections`: several runs smoothed at once;
-//! - `blending`: stretches to blocks: the choice of the junctions that are blended, and `crossing`: how one
-//!   is crossed;
+//! - `blending`: stretches to blocks: the choice of the junctions that are blended, `crossing`: how one is crossed,
+//!   `shapes`: its blends and easements, each made once, and `compared`: the best of its crossings;
 //! - [`outputs`]: spindle and coolant: what the machine switches;
 //! - `ceilings`: the ceiling of a move or a blend, and of a junction;
 //! - `curves`: programmed curves to moves;
@@ -34,6 +34,7 @@
 pub mod blocks;
 mod blending;
 mod ceilings;
+mod compared;
 mod compiled;
 mod crossing;
 mod curves;
@@ -42,6 +43,7 @@ mod items;
 mod pipeline;
 mod runs;
 mod sections;
+mod shapes;
 pub mod error;
 pub mod executable;
 mod lookahead;

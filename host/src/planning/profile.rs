@@ -5,6 +5,8 @@ use motion_kernel::plan::BlockPlan;
 
 /// Positions closer than this are the same: ramps start and end on position steps, blocks do not.
 pub(super) const ROUNDING_MM: f64 = 1.0e-9;
+/// Steps to the time at which a ramp is at a place; most take six.
+const STEPS_MAX: usize = 64;
 
 /// The feed over a stretch.
 #[derive(Clone, Debug, Default)]
@@ -107,12 +109,67 @@ impl PlacedRamp {
             let feed = ramp.from_mm_s;
             return (feed, self.start_s + local_mm / feed);
         }
-        // The position grows with time: halve until the time has its last digit.
-        let (mut early, mut late) = (0.0, self.time_s());
-        for _ in 0..64 {
-            let middle = 0.5 * (early + late);
-            if ramp.at(middle).s_mm < local_mm { early = middle } else { late = middle }
+        // The position grows with time: Newton's method between two times, or half of what is between them where its
+        // steps don't halve, as close to rest.
+        let (mut early_s, mut late_s) = (0.0, self.time_s());
+        let mut time_s = late_s * (local_mm / self.length_mm());
+        let mut step_before_s = late_s;
+        let mut state = ramp.at(time_s);
+        for _ in 0..STEPS_MAX {
+            if state.s_mm < local_mm {
+                early_s = time_s
+            } else {
+                late_s = time_s
+            }
+            let step_s = (local_mm - state.s_mm) / state.v_mm_s;
+            let is_good =
+                (early_s..=late_s).contains(&(time_s + step_s)) && 2.0 * step_s.abs() <= step_before_s;
+            let next_s = if is_good { time_s + step_s } else { f64::midpoint(early_s, late_s) };
+            step_before_s = (next_s - time_s).abs();
+            time_s = next_s;
+            state = ramp.at(time_s);
+            if step_before_s <= f64::EPSILON * time_s {
+                break;
+            }
         }
-        (ramp.at(late).v_mm_s, self.start_s + late)
+        (state.v_mm_s, self.start_s + time_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use motion_kernel::law::{Law, Limits, Pulse, Ramp};
+
+    use super::*;
+
+    /// Where a ramp is at a time it is at that time, close to rest and to its ends, too.
+    #[test]
+    fn a_place_has_its_time_and_feed() {
+        let limits = Limits { accel_mm_s2: 500.0, jerk_mm_s3: 5e3, snap_mm_s4: 4e5 };
+        for pulse in [Pulse::Sin2, Pulse::Plateau] {
+            let law = Law::new(pulse, limits).expect("positive limits");
+            for (from_mm_s, to_mm_s) in [(0.0, 50.0), (50.0, 0.0), (20.0, 20.5), (0.0, 1e-3), (300.0, 1.0)] {
+                let ramp = Ramp::new(&law, from_mm_s, to_mm_s);
+                let length = motion_kernel::units::Position::from_mm(ramp.length_mm()).expect("in range");
+                let planned = PlannedRamp::new(&ramp, length, 0.0005).expect("a ramp");
+                let placed = PlacedRamp { start_mm: 7.0, start_s: 3.0, planned };
+                for part in (1..1000).map(|part| f64::from(part) / 1000.0) {
+                    let time_s = part * placed.time_s();
+                    let state = planned.ramp.at(time_s);
+                    if state.s_mm <= ROUNDING_MM || state.s_mm >= placed.length_mm() - ROUNDING_MM {
+                        continue;
+                    }
+                    let (feed_mm_s, at_s) = placed.at(7.0 + state.s_mm);
+                    // What rounding of the place and of its time leaves.
+                    let place_mm = 7.0 + placed.length_mm();
+                    let rounding_s = 4.0 * f64::EPSILON * (place_mm / state.v_mm_s + 3.0 + placed.time_s());
+                    assert!((at_s - 3.0 - time_s).abs() < rounding_s, "{part} {at_s}");
+                    assert!(
+                        (feed_mm_s - state.v_mm_s).abs() < 1e-12 + state.a_mm_s2.abs() * rounding_s,
+                        "{part}"
+                    );
+                }
+            }
+        }
     }
 }

@@ -19,6 +19,8 @@ pub struct StretchBlock<const N: usize = 3> {
     pub line: u32,
     /// Geometry.
     pub element: Element<N>,
+    /// Its length \[mm\].
+    pub length_mm: f64,
     /// Ceiling with its reason, and the law for its ramps.
     pub ceiling: Ceiling<f64>,
     /// The same whatever the program's feed.
@@ -44,7 +46,7 @@ impl<const N: usize> StretchBlock<N> {
     /// The block as look-ahead sees it.
     pub(super) fn for_lookahead(&self) -> Block<f64> {
         let Ceiling { feed_mm_s: cap_mm_s, law, .. } = self.ceiling;
-        Block { length_mm: self.element.length_mm(), cap_mm_s, junction_mm_s: self.junction_mm_s, law }
+        Block { length_mm: self.length_mm, cap_mm_s, junction_mm_s: self.junction_mm_s, law }
     }
 }
 
@@ -93,7 +95,7 @@ impl<'m, const N: usize> Growing<'m, N> {
                 }
                 self.give(last, known)?;
             }
-            self.end_mm += block.element.length_mm();
+            self.end_mm += block.length_mm;
             let end = on_path(self.end_mm).map_err(|error| (block.line, error.into()))?;
             self.ahead.push(block.line, block.for_lookahead(), end);
             self.last = Some(block);
@@ -147,7 +149,7 @@ pub struct Stretch<const N: usize = 3> {
 impl<const N: usize> Stretch<N> {
     /// A stretch of blocks with the ramps over them.
     pub(super) fn new(start_mm: f64, blocks: Vec<StretchBlock<N>>, ramps: &[PlannedRamp]) -> Self {
-        let lengths_mm = blocks.iter().map(|block| block.element.length_mm());
+        let lengths_mm = blocks.iter().map(|block| block.length_mm);
         let ends_mm = lengths_mm.scan(0.0, |end_mm, length_mm| {
             *end_mm += length_mm;
             Some(*end_mm)

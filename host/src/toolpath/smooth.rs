@@ -155,16 +155,21 @@ impl<const N: usize> Run<N> {
         share(off_mm + distance_mm, before.tolerance_mm.min(after.tolerance_mm) + merging_mm)
     }
 
+    /// Whether something steps at a junction of lines or arcs, so that there may be a blend.
+    #[must_use]
+    pub fn has_blend(&self, junction: usize) -> bool {
+        let [before, after] = [junction, junction + 1].map(|index| &self.moves[index].element);
+        has_side(before) && has_side(after) && !is_smooth([before, after])
+    }
+
     /// The blend of a junction with at most `room_mm` of either move; none where nothing steps.
     #[must_use]
     pub fn blend(&self, junction: usize, room_mm: f64, limits: &Limits<f64>) -> Option<Blend<N>> {
-        let (before, after) = (&self.moves[junction], &self.moves[junction + 1]);
-        if !(has_side(&before.element) && has_side(&after.element))
-            || is_smooth([&before.element, &after.element])
-        {
+        if !self.has_blend(junction) {
             return None;
         }
-        Blend::new(&before.element, &after.element, self.left_mm(junction), room_mm, limits)
+        let [before, after] = [junction, junction + 1].map(|index| &self.moves[index].element);
+        Blend::new(before, after, self.left_mm(junction), room_mm, limits)
     }
 
     /// The easements of a junction with at most `rooms_mm` of the two moves.
@@ -183,7 +188,8 @@ impl<const N: usize> Run<N> {
     }
 
     /// What is left of the tolerance of a junction \[mm\]. A move of exact path is cut at neither end.
-    fn left_mm(&self, junction: usize) -> f64 {
+    #[must_use]
+    pub fn left_mm(&self, junction: usize) -> f64 {
         let (before, after) = (&self.moves[junction], &self.moves[junction + 1]);
         let spent_mm =
             before.spent_mm(self.distances_mm[junction]).max(after.spent_mm(self.distances_mm[junction + 1]));

@@ -1,0 +1,215 @@
+//! Crossings of one junction, compared by the time that look-ahead takes over its neighbourhood.
+//!
+//! Consumes the moves of a run with their ceilings, how the other junctions are crossed, and the crossings to choose from; tells
+//! the best, and when those that are left can't be better. Background, a plan of at most ten blocks for each crossing.
+
+use motion_kernel::law::Ramp;
+use motion_kernel::plan::{Block, BlockPlan, Ceiling, Node, PlanError, nodes_for, plan, plan_spanning};
+
+use super::ceilings::Ceilings;
+use super::crossing::Crossing;
+use crate::toolpath::smooth::Run;
+
+/// Part of the time that a junction without a blend has to gain over the best one.
+pub(super) const EXACT_GAIN_MIN: f64 = 0.002;
+
+/// How many more moves are looked at on either side of those at a junction.
+pub(super) const BESIDE: usize = 1;
+/// Blocks of that many moves and of what rounds the junctions between them.
+const BLOCKS: usize = 3 * (2 * BESIDE + 2) - 2;
+/// How often the feeds at the ends of a comparison are lowered until every crossing can be planned.
+const LOWERINGS: usize = 8;
+/// Feeds that a plan has named as just possible, made a little less.
+const LESS: f64 = 1.0 - 1.0e-9;
+/// Times, lengths and feeds that differ by less than this part are alike.
+const ALIKE: f64 = 1.0e-6;
+
+/// Crossings of a junction that are compared.
+pub(super) struct Compared<'a, const N: usize> {
+    run: &'a Run<N>,
+    /// The ceilings of the moves.
+    ceilings: &'a [Ceilings],
+    junction: usize,
+    /// How the others are crossed.
+    chosen: &'a [Crossing<N>],
+    /// Feeds at both ends of the neighbourhood that all have a plan with \[mm/s\].
+    feeds_mm_s: [f64; 2],
+    crossings: Vec<(Crossing<N>, Window)>,
+    /// Those that have plans; some are to be made.
+    plans: Vec<Planned>,
+    /// Where those of one size end.
+    ends: Vec<usize>,
+}
+
+/// The neighbourhood of a junction.
+struct Window {
+    blocks: Vec<Block<f64>>,
+    /// The first block of what takes the place of the junction; of the move behind it, if nothing does.
+    driven: usize,
+}
+
+/// How a neighbourhood is driven.
+#[derive(Clone, Copy)]
+struct Planned {
+    /// Infinite if there is no plan \[s\].
+    time_s: f64,
+    /// What takes the place of the junction is driven at its ceiling all along.
+    is_level: bool,
+}
+
+impl<'a, const N: usize> Compared<'a, N> {
+    pub(super) fn new(
+        run: &'a Run<N>,
+        ceilings: &'a [Ceilings],
+        junction: usize,
+        chosen: &'a [Crossing<N>],
+    ) -> Self {
+        let (first, last) = beside(run, junction);
+        let feed = |junction: Option<usize>| {
+            junction.and_then(|junction| chosen.get(junction)).map_or(0.0, |crossing| crossing.feed_mm_s)
+        };
+        let feeds_mm_s = [feed(first.checked_sub(1)), feed(Some(last))];
+        let (crossings, plans, ends) = (Vec::new(), Vec::new(), Vec::new());
+        Self { run, ceilings, junction, chosen, feeds_mm_s, crossings, plans, ends }
+    }
+
+    /// Compares one more; whether it is no better than those before though it is driven at its ceiling all along.
+    pub(super) fn add(&mut self, crossing: Crossing<N>) -> bool {
+        let window = self.window(&crossing);
+        let feeds_mm_s = common_feeds(&window.blocks, self.feeds_mm_s);
+        if feeds_mm_s != self.feeds_mm_s {
+            self.feeds_mm_s = feeds_mm_s;
+            self.plans.clear();
+        }
+        self.crossings.push((crossing, window));
+        let new = self.crossings[self.plans.len()..].iter();
+        self.plans.extend(new.map(|(_, window)| window.planned(feeds_mm_s)));
+        let (last, before) = self.plans.split_last().unzip();
+        last.is_some_and(|last: &Planned| last.is_level && last.time_s >= least_s(before.unwrap_or(&[])))
+    }
+
+    /// Those that were added since this was said before are of one size; the first have no blend.
+    pub(super) fn end_size(&mut self) {
+        self.ends.push(self.crossings.len());
+    }
+
+    /// Whether blends of the `left` sizes that are to be added can't be the best, if each gains no more than the last: ever
+    /// shorter ones are added.
+    pub(super) fn is_beyond(&self, left: usize) -> bool {
+        let [without, .., before, last] = self.ends[..] else { return false };
+        let start = self.ends[..self.ends.len() - 2].last().copied().unwrap_or(0);
+        let (before, last) = (&self.plans[start..before], &self.plans[before..last]);
+        let is_known = before.iter().chain(last).all(|plan| plan.time_s.is_finite());
+        let (exact_s, blended_s) = (least_s(&self.plans[..without]), least_s(&self.plans[without..]));
+        let best_s = blended_s.min(exact_s / (1.0 - EXACT_GAIN_MIN));
+        let (before_s, last_s) = (least_s(before), least_s(last));
+        let gain_s = (before_s - last_s).max(0.0);
+        is_known && last_s > best_s * (1.0 + ALIKE) && last_s - left as f64 * gain_s > best_s
+    }
+
+    /// The best: a blend, unless another way gains [`EXACT_GAIN_MIN`]; the one that is chosen if none has a plan.
+    pub(super) fn best(self) -> Crossing<N> {
+        let mut best = (&self.chosen[self.junction], f64::INFINITY);
+        for has_blend in [true, false] {
+            let gain = if has_blend { 0.0 } else { EXACT_GAIN_MIN };
+            for ((crossing, _), plan) in self.crossings.iter().zip(&self.plans) {
+                if crossing.blend().is_some() == has_blend && plan.time_s < (1.0 - gain) * best.1 {
+                    best = (crossing, plan.time_s);
+                }
+            }
+        }
+        best.0.clone()
+    }
+
+    /// The neighbourhood of the junction, which is crossed as `crossing` says.
+    fn window(&self, crossing: &Crossing<N>) -> Window {
+        let crossing = |junction: usize| {
+            if junction == self.junction { Some(crossing) } else { self.chosen.get(junction) }
+        };
+        let trims_mm =
+            |junction: Option<usize>| junction.and_then(crossing).map_or([0.0; 2], Crossing::trims_mm);
+        let (first, last) = beside(self.run, self.junction);
+        let mut blocks = Vec::with_capacity(BLOCKS);
+        let mut driven = 0;
+        for index in first..=last {
+            let ([_, first_mm], [last_mm, _]) = (trims_mm(index.checked_sub(1)), trims_mm(Some(index)));
+            let length_mm = self.run.length_mm(index) - first_mm - last_mm;
+            let after = crossing(index).filter(|_| index < last);
+            let junction_mm_s = after.map_or(f64::INFINITY, Crossing::enter_mm_s);
+            let block = |length_mm, ceiling: &Ceiling<f64>, junction_mm_s| Block {
+                length_mm,
+                cap_mm_s: ceiling.feed_mm_s,
+                junction_mm_s,
+                law: ceiling.law,
+            };
+            blocks.push(block(length_mm, &self.ceilings[index].programmed, junction_mm_s));
+            if index == self.junction {
+                driven = blocks.len();
+            }
+            blocks.extend(
+                after
+                    .map_or(&[][..], Crossing::driven)
+                    .iter()
+                    .map(|driven| block(driven.bent.length_mm, &driven.ceilings.programmed, driven.end_mm_s)),
+            );
+        }
+        Window { blocks, driven }
+    }
+}
+
+impl Window {
+    fn planned(&self, [start_mm_s, end_mm_s]: [f64; 2]) -> Planned {
+        let Some(driven) = self.blocks.get(self.driven) else {
+            return Planned { time_s: f64::INFINITY, is_level: false };
+        };
+        let start_mm: f64 = self.blocks[..self.driven].iter().map(|block| block.length_mm).sum();
+        let end_mm = start_mm + driven.length_mm;
+        let mut level_mm = 0.0;
+        let mut add_level = |at_mm: f64, ramp: &Ramp<f64>| {
+            if ramp.is_cruise() && ramp.from_mm_s >= (1.0 - ALIKE) * driven.cap_mm_s && at_mm < end_mm {
+                level_mm += ((at_mm + ramp.length_mm()).min(end_mm) - at_mm.max(start_mm)).max(0.0);
+            }
+        };
+        let mut nodes = [Node::EMPTY; nodes_for(BLOCKS)];
+        let time_s = plan_spanning(&self.blocks, start_mm_s, end_mm_s, &mut nodes, &mut add_level);
+        let time_s = time_s.ok().flatten().unwrap_or(f64::INFINITY);
+        Planned { time_s, is_level: time_s.is_finite() && level_mm >= (1.0 - ALIKE) * driven.length_mm }
+    }
+}
+
+/// The first and the last move that are looked at for a junction.
+fn beside<const N: usize>(run: &Run<N>, junction: usize) -> (usize, usize) {
+    (junction.saturating_sub(BESIDE), (junction + 1 + BESIDE).min(run.junctions()))
+}
+
+fn least_s(plans: &[Planned]) -> f64 {
+    plans.iter().map(|plan| plan.time_s).fold(f64::INFINITY, f64::min)
+}
+
+/// Feeds at both ends that blocks can be planned with, at most `feeds` \[mm/s\].
+fn common_feeds(blocks: &[Block<f64>], mut feeds: [f64; 2]) -> [f64; 2] {
+    if blocks.iter().any(|block| !(block.length_mm > 0.0)) {
+        return feeds;
+    }
+    for _ in 0..LOWERINGS {
+        let mut plans = [BlockPlan::default(); BLOCKS];
+        match plan(blocks, feeds[0], feeds[1], &mut plans[..blocks.len()]) {
+            Ok(()) => return feeds,
+            Err(PlanError::TooShortToBrake { greatest_mm_s, .. }) => feeds[0] = LESS * greatest_mm_s,
+            Err(PlanError::TooShortToAccelerate { greatest_mm_s, .. }) => feeds[1] = LESS * greatest_mm_s,
+            Err(PlanError::EndFeed { quantity, greatest_mm_s, .. }) => {
+                feeds[usize::from(quantity == "end feed")] = greatest_mm_s;
+            }
+            Err(_) => return [0.0; 2],
+        }
+    }
+    [0.0; 2]
+}
+
+#[cfg(test)]
+impl<const N: usize> Compared<'_, N> {
+    /// The times of those that were added, in their order \[s\].
+    pub(super) fn times_s(&self) -> Vec<f64> {
+        self.plans.iter().map(|plan| plan.time_s).collect()
+    }
+}
