@@ -15,8 +15,8 @@
 //! at its longest and as it was programmed, too, and the best of these is taken. So blends and merged lines
 //! cost at most that part of the time that the exact path takes without its kinks.
 //!
-//! **What can't gain is left out**, where that is seen before: shorter blends once they lose more than those that are left
-//! could gain back, ramps on a blend that is driven at its ceiling all along and is no better, and a whole run whose longest
+//! **What is not expected to gain is left out**: shorter blends once they lose more than those that are left would gain back at
+//! the last rate, ramps on a blend that is driven at its ceiling all along and is no better, and a whole run whose longest
 //! blends would take too long even if they left all of the limits to ramps.
 //!
 //! **Tangent junctions** whose curvature jumps are treated alike: passed without a blend they fall under the
@@ -31,6 +31,7 @@
 use std::cell::OnceCell;
 use std::rc::Rc;
 
+use motion_kernel::law::Law;
 use motion_kernel::plan::{BLEND_FEED_SHARE, Block, Ceiling, Node, nodes_for, plan_spanning};
 
 use super::Mode;
@@ -39,9 +40,10 @@ use super::compared::{BESIDE, Compared, EXACT_GAIN_MIN};
 use super::crossing::{By, Crossing, Driven, Eased, Rounding};
 use super::error::AtLine;
 use super::lookahead::lookahead;
-use super::shapes::{Bent, Blended, EasedBy, Shapes};
+use super::shapes::{MeasuredBlend, MeasuredCurve, MeasuredEasement, Shapes};
 use super::stretch::StretchBlock;
 use crate::machine::Machine;
+use crate::toolpath::blend::feed_within;
 use crate::toolpath::smooth::{Move, Run};
 use crate::toolpath::{norm, subtract};
 
@@ -152,7 +154,8 @@ impl<'a, const N: usize> Junctions<'a, N> {
     fn choose(&self, most_s: f64) -> AtLine<Vec<Timed<N>>> {
         // First as if each were alone, then those that touch within what the other leaves.
         let junctions = 0..self.run.junctions();
-        let alone: Vec<Option<Rc<Blended<N>>>> = junctions.map(|junction| self.longest(junction)).collect();
+        let alone: Vec<Option<Rc<MeasuredBlend<N>>>> =
+            junctions.map(|junction| self.longest(junction)).collect();
         if alone.iter().all(Option::is_none) {
             return Ok(Vec::new());
         }
@@ -227,14 +230,25 @@ impl<'a, const N: usize> Junctions<'a, N> {
     }
 
     /// The longest blend of a junction, as if it were alone.
-    fn longest(&self, junction: usize) -> Option<Rc<Blended<N>>> {
+    fn longest(&self, junction: usize) -> Option<Rc<MeasuredBlend<N>>> {
         let room_mm = self.run.taken_mm_max(junction).min(self.run.taken_mm_max(junction + 1));
         self.shapes.blend(&self.run, junction, room_mm)
     }
 
     /// About the time that the run takes with blends, of which those `alone` are the longest, in these rooms \[s\]: rather less,
-    /// because each is as fast as the longest by itself and leaves all of the limits to ramps.
-    fn about_s(&self, alone: &[Option<Rc<Blended<N>>>], rooms_mm: &[f64]) -> AtLine<f64> {
+    /// because each is as fast as the longest by itself within the limits of the path, whatever those of the axes are, and
+    /// leaves all of the limits to ramps. Rotary axes may relax the limits of the path: then it is nothing.
+    fn about_s(&self, alone: &[Option<Rc<MeasuredBlend<N>>>], rooms_mm: &[f64]) -> AtLine<f64> {
+        let is_linear = self.machine.linear_places();
+        let is_rotary = |step: &Move<N>| {
+            step.element.moves().iter().zip(is_linear).any(|(&moves, linear)| moves && !linear)
+        };
+        let path = self.machine.limits().path.limits;
+        let (Ok(all), false) =
+            (Law::new(self.machine.path.pulse, path), self.run.moves().iter().any(is_rotary))
+        else {
+            return Ok(0.0);
+        };
         let trim_mm = |junction: Option<usize>| match junction.and_then(|junction| alone.get(junction)) {
             Some(Some(blended)) => blended.blend.trim_mm.min(rooms_mm[junction.unwrap_or(0)]),
             _ => 0.0,
@@ -254,8 +268,8 @@ impl<'a, const N: usize> Junctions<'a, N> {
                 let (from, to) = blended.blend.element.ends_mm();
                 let length_mm = norm(subtract(to, from)) * (trim_mm(Some(index)) / blended.blend.trim_mm);
                 let next_mm_s = self.ceilings[index + 1].programmed.feed_mm_s;
-                let cap_mm_s = blended.blend.feed_mm_s.min(cap_mm_s).min(next_mm_s);
-                blocks.push(Block { length_mm, cap_mm_s, junction_mm_s: f64::INFINITY, law });
+                let cap_mm_s = feed_within(&path, blended.blend.derivatives).min(cap_mm_s).min(next_mm_s);
+                blocks.push(Block { length_mm, cap_mm_s, junction_mm_s: f64::INFINITY, law: all });
             }
             if junction_mm_s <= 0.0 {
                 time_s += spanned_s(&blocks);
@@ -345,7 +359,11 @@ impl<'a, const N: usize> Junctions<'a, N> {
     }
 
     /// A junction with an easement.
-    fn eased_by(&self, junction: usize, EasedBy { easement, sides }: &EasedBy<N>) -> AtLine<Crossing<N>> {
+    fn eased_by(
+        &self,
+        junction: usize,
+        MeasuredEasement { easement, sides }: &MeasuredEasement<N>,
+    ) -> AtLine<Crossing<N>> {
         let share = self.machine.path.curve_feed_share;
         let sides = sides.iter().map(|side| self.driven(junction, side, share));
         let mut sides = sides.collect::<AtLine<Vec<_>>>()?;
@@ -367,7 +385,7 @@ impl<'a, const N: usize> Junctions<'a, N> {
         for side in &mut sides {
             if side.ceilings.programmed.feed_mm_s > reach_mm_s {
                 let reason = side.ceilings.programmed.reason;
-                let Bent { greatest, ratios, .. } = &*side.bent;
+                let MeasuredCurve { greatest, ratios, .. } = &*side.bent;
                 let lowered = ceilings(reach_mm_s, greatest, ratios, share, self.machine);
                 let lowered = lowered.map_err(|error| (self.run.moves()[junction].line, error.into()))?;
                 let lowered = Ceiling { reason, ..lowered.programmed };
@@ -385,7 +403,7 @@ impl<'a, const N: usize> Junctions<'a, N> {
     }
 
     /// A junction with a blend, driven at a share.
-    fn rounded(&self, junction: usize, blended: &Rc<Blended<N>>, share: f64) -> AtLine<Crossing<N>> {
+    fn rounded(&self, junction: usize, blended: &Rc<MeasuredBlend<N>>, share: f64) -> AtLine<Crossing<N>> {
         let driven = self.driven(junction, &self.shapes.bent(blended), share)?;
         let feed_mm_s = driven.ceilings.programmed.feed_mm_s;
         let rounding = Rounding { blended: Rc::clone(blended), share, driven };
@@ -393,13 +411,13 @@ impl<'a, const N: usize> Junctions<'a, N> {
     }
 
     /// The same at each of the two shares.
-    fn shared(&self, junction: usize, blended: &Rc<Blended<N>>) -> AtLine<[Crossing<N>; 2]> {
+    fn shared(&self, junction: usize, blended: &Rc<MeasuredBlend<N>>) -> AtLine<[Crossing<N>; 2]> {
         let at = |share: f64| self.rounded(junction, blended, share);
         Ok([at(BLEND_FEED_SHARE)?, at(self.machine.path.curve_feed_share)?])
     }
 
     /// What is put in the place of a junction, driven at a share.
-    fn driven(&self, junction: usize, bent: &Rc<Bent<N>>, share: f64) -> AtLine<Driven<N>> {
+    fn driven(&self, junction: usize, bent: &Rc<MeasuredCurve<N>>, share: f64) -> AtLine<Driven<N>> {
         let [before, after] = [junction, junction + 1].map(|index| &self.run.moves()[index]);
         let feed_mm_s = before.feeds.least(after.feeds).along(&bent.ratios);
         let ceilings = ceilings(feed_mm_s, &bent.greatest, &bent.ratios, share, self.machine)
@@ -409,7 +427,12 @@ impl<'a, const N: usize> Junctions<'a, N> {
 
     /// The best crossing of a junction, whose longest blend is `alone` if there is room for it, the others being crossed as
     /// `chosen` says.
-    fn best(&self, junction: usize, alone: &Rc<Blended<N>>, chosen: &[Crossing<N>]) -> AtLine<Crossing<N>> {
+    fn best(
+        &self,
+        junction: usize,
+        alone: &Rc<MeasuredBlend<N>>,
+        chosen: &[Crossing<N>],
+    ) -> AtLine<Crossing<N>> {
         let rooms_mm = self.rooms_mm(junction, |junction| chosen[junction].trims_mm());
         let longest_mm = least(rooms_mm).min(alone.blend.trim_mm);
         let mut compared = Compared::new(&self.run, &self.ceilings, junction, chosen);
@@ -556,6 +579,8 @@ fn stretch_time_s<const N: usize>(stretch: &[StretchBlock<N>], tick_s: f64) -> O
 
 #[cfg(test)]
 mod tests {
+    use motion_tests::random::Random;
+
     use super::*;
     use crate::toolpath::smooth::tests::path;
     use crate::toolpath::{Element, Feeds, add, angle, scale};
@@ -671,33 +696,45 @@ mod tests {
         assert!(first > 0.5 && second > 0.2 && (first + second - 0.9).abs() < 1e-9, "{first} {second}");
     }
 
-    /// Random lines and feeds: whether what is left out would have been better.
+    /// Seven lines of random lengths, angles, feeds and tolerance.
+    fn random_lines(random: &mut Random) -> Vec<Move> {
+        let (mut at, mut heading_rad, mut points) = ([0.0, 0.0], 0.0, vec![[0.0, 0.0]]);
+        for _ in 0..7 {
+            let (sine, cosine) = libm::sincos(heading_rad);
+            let length_mm = random.log(0.2, 20.0);
+            at = [at[0] + length_mm * cosine, at[1] + length_mm * sine];
+            points.push(at);
+            heading_rad += (random.unit() - 0.5) * 5.0;
+        }
+        let feeds_mm_s: Vec<f64> = points.iter().map(|_| random.log(3.0, 100.0)).collect();
+        path(&points, random.log(2e-3, 0.2), |line| feeds_mm_s[line as usize])
+    }
+
+    /// What is left out would hardly have been better, beside junctions that are blended or not.
     #[test]
     fn what_is_left_out_gains_hardly_anything() {
         let machine = Machine::reference();
-        let mut random = motion_tests::random::Random::of_stream(71);
+        let mut random = Random::of_stream(71);
         let (mut looks, mut missed, mut worst, mut lost) = (0, 0, 0.0_f64, 0.0);
-        for _ in 0..400 {
-            let (mut at, mut heading_rad, mut points) = ([0.0, 0.0], 0.0, vec![[0.0, 0.0]]);
-            for _ in 0..6 {
-                let (sine, cosine) = libm::sincos(heading_rad);
-                let length_mm = random.log(0.2, 20.0);
-                at = [at[0] + length_mm * cosine, at[1] + length_mm * sine];
-                points.push(at);
-                heading_rad += (random.unit() - 0.5) * 5.0;
-            }
-            let feeds_mm_s: Vec<f64> = points.iter().map(|_| random.log(3.0, 100.0)).collect();
-            let moves = path(&points, random.log(2e-3, 0.2), |line| feeds_mm_s[line as usize]);
+        for case in 0..400 {
+            let moves = random_lines(&mut random);
             let shapes = shapes(&moves, &machine);
             let junctions = Junctions::new(Run::exact(&moves), &shapes, &machine).expect("limits");
-            let exact = junctions.exact().expect("limits");
-            for junction in 0..exact.len() {
+            let mut beside = junctions.exact().expect("limits");
+            for junction in (0..beside.len()).skip(case % 2).step_by(2) {
+                let rooms_mm = junctions.rooms_mm(junction, |other| beside[other].trims_mm());
+                if let Some(blended) = shapes.blend(&junctions.run, junction, 0.5 * least(rooms_mm)) {
+                    beside[junction] =
+                        junctions.rounded(junction, &blended, BLEND_FEED_SHARE).expect("limits");
+                }
+            }
+            for junction in 0..beside.len() {
                 let Some(alone) = junctions.longest(junction) else { continue };
-                let best = junctions.best(junction, &alone, &exact).expect("limits");
-                let mut all = Compared::new(&junctions.run, &junctions.ceilings, junction, &exact);
+                let best = junctions.best(junction, &alone, &beside).expect("limits");
+                let mut all = Compared::new(&junctions.run, &junctions.ceilings, junction, &beside);
                 all.add(best);
-                all.add(exact[junction].clone());
-                let rooms_mm = junctions.rooms_mm(junction, |other| exact[other].trims_mm());
+                all.add(junctions.exact_at(junction).expect("limits"));
+                let rooms_mm = junctions.rooms_mm(junction, |other| beside[other].trims_mm());
                 for size in SIZES {
                     let room_mm = size * least(rooms_mm).min(alone.blend.trim_mm);
                     let blended = shapes.blend(&junctions.run, junction, room_mm).expect("a blend");
@@ -708,6 +745,9 @@ mod tests {
                 let times_s = all.times_s();
                 let least_s =
                     times_s[2..].iter().copied().fold(times_s[1] / (1.0 - EXACT_GAIN_MIN), f64::min);
+                if !least_s.is_finite() {
+                    continue;
+                }
                 let off = times_s[0] / least_s - 1.0;
                 looks += 1;
                 missed += u32::from(off > 1e-9);
@@ -717,7 +757,41 @@ mod tests {
         }
         let mean = lost / f64::from(looks);
         println!("{missed} of {looks} missed, {mean:.2e} lost in the mean, {worst:.4} at worst");
-        assert!(looks > 1500 && missed * 60 < looks && mean < 1.2e-4 && worst < 0.05);
+        assert!(looks > 2000 && missed * 150 < looks && mean < 2e-4 && worst < 0.18);
+    }
+
+    /// The estimate by which a run is left is hardly more than what its longest blends take, on a machine with a slow axis that
+    /// is not in their plane, too.
+    #[test]
+    fn a_run_is_estimated_from_below() {
+        let mut slow = Machine::reference();
+        let z = &mut slow.axes[2];
+        for limit in [&mut z.accel_mm_s2, &mut z.jerk_mm_s3, &mut z.snap_mm_s4] {
+            *limit *= 0.1;
+        }
+        for machine in [Machine::reference(), slow] {
+            let mut random = Random::of_stream(72);
+            let (mut most, mut least_part) = (0.0_f64, f64::INFINITY);
+            for _ in 0..300 {
+                let moves = random_lines(&mut random);
+                let shapes = shapes(&moves, &machine);
+                let junctions = Junctions::new(Run::exact(&moves), &shapes, &machine).expect("limits");
+                let count = junctions.run.junctions();
+                let alone: Vec<_> = (0..count).map(|junction| junctions.longest(junction)).collect();
+                let trims_mm: Vec<_> =
+                    alone.iter().map(|alone| alone.as_ref().map_or(0.0, |of| of.blend.trim_mm)).collect();
+                let room_mm = |junction: usize| {
+                    least(junctions.rooms_mm(junction, |other| [trims_mm[other]; 2])).min(trims_mm[junction])
+                };
+                let rooms_mm: Vec<_> = (0..count).map(room_mm).collect();
+                let about_s = junctions.about_s(&alone, &rooms_mm).expect("limits");
+                let longest_s = junctions.choose(f64::INFINITY).expect("limits")[0].time_s;
+                most = most.max(about_s / longest_s);
+                least_part = least_part.min(about_s / longest_s);
+            }
+            println!("{least_part:.3} to {most:.3} of the time of the longest blends");
+            assert!(most < 1.01 && least_part > 0.5);
+        }
     }
 
     /// A right angle is rounded at a low feed. At a high feed stopping on it takes less time.

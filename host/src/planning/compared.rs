@@ -1,7 +1,8 @@
 //! Crossings of one junction, compared by the time that look-ahead takes over its neighbourhood.
 //!
 //! Consumes the moves of a run with their ceilings, how the other junctions are crossed, and the crossings to choose from; tells
-//! the best, and when those that are left can't be better. Background, a plan of at most ten blocks for each crossing.
+//! the best, and when those that are left are not expected to be better. Background: plans of at most ten blocks, one for each
+//! crossing, and all once more where a crossing lowers the feeds at the ends of all, which two pairs of plans may do.
 
 use motion_kernel::law::Ramp;
 use motion_kernel::plan::{Block, BlockPlan, Ceiling, Node, PlanError, nodes_for, plan, plan_spanning};
@@ -21,7 +22,9 @@ const BLOCKS: usize = 3 * (2 * BESIDE + 2) - 2;
 const LOWERINGS: usize = 8;
 /// Feeds that a plan has named as just possible, made a little less.
 const LESS: f64 = 1.0 - 1.0e-9;
-/// Times, lengths and feeds that differ by less than this part are alike.
+/// How much longer than the best the shorter blends have to be expected to take, so that they are not tried.
+const CLEAR: f64 = 1.01;
+/// Lengths and feeds that differ by less than this part are alike.
 const ALIKE: f64 = 1.0e-6;
 
 /// Crossings of a junction that are compared.
@@ -32,10 +35,10 @@ pub(super) struct Compared<'a, const N: usize> {
     junction: usize,
     /// How the others are crossed.
     chosen: &'a [Crossing<N>],
-    /// Feeds at both ends of the neighbourhood that all have a plan with \[mm/s\].
+    /// Feeds at both ends of the neighbourhood, with which all crossings can be planned \[mm/s\].
     feeds_mm_s: [f64; 2],
     crossings: Vec<(Crossing<N>, Window)>,
-    /// Those that have plans; some are to be made.
+    /// The plans of the first crossings, in their order.
     plans: Vec<Planned>,
     /// Where those of one size end.
     ends: Vec<usize>,
@@ -44,8 +47,8 @@ pub(super) struct Compared<'a, const N: usize> {
 /// The neighbourhood of a junction.
 struct Window {
     blocks: Vec<Block<f64>>,
-    /// The first block of what takes the place of the junction; of the move behind it, if nothing does.
-    driven: usize,
+    /// Which block is the blend, if there is one.
+    blend: Option<usize>,
 }
 
 /// How a neighbourhood is driven.
@@ -53,7 +56,7 @@ struct Window {
 struct Planned {
     /// Infinite if there is no plan \[s\].
     time_s: f64,
-    /// What takes the place of the junction is driven at its ceiling all along.
+    /// There is a blend, and it is driven at its ceiling all along.
     is_level: bool,
 }
 
@@ -73,19 +76,49 @@ impl<'a, const N: usize> Compared<'a, N> {
         Self { run, ceilings, junction, chosen, feeds_mm_s, crossings, plans, ends }
     }
 
-    /// Compares one more; whether it is no better than those before though it is driven at its ceiling all along.
+    /// Compares one more; whether it is a blend that is no better than those before, though it is driven at its ceiling all
+    /// along.
     pub(super) fn add(&mut self, crossing: Crossing<N>) -> bool {
+        let before_s = self.best_s();
         let window = self.window(&crossing);
-        let feeds_mm_s = common_feeds(&window.blocks, self.feeds_mm_s);
+        self.crossings.push((crossing, window));
+        let feeds_mm_s = self.common_feeds();
         if feeds_mm_s != self.feeds_mm_s {
             self.feeds_mm_s = feeds_mm_s;
             self.plans.clear();
         }
-        self.crossings.push((crossing, window));
         let new = self.crossings[self.plans.len()..].iter();
         self.plans.extend(new.map(|(_, window)| window.planned(feeds_mm_s)));
-        let (last, before) = self.plans.split_last().unzip();
-        last.is_some_and(|last: &Planned| last.is_level && last.time_s >= least_s(before.unwrap_or(&[])))
+        self.plans.last().is_some_and(|last| last.is_level && last.time_s >= before_s)
+    }
+
+    /// Feeds at both ends that all crossings, of which the last is new, can be planned with \[mm/s\]: at most those that the
+    /// others can.
+    fn common_feeds(&self) -> [f64; 2] {
+        let Some(((_, new), others)) = self.crossings.split_last() else { return self.feeds_mm_s };
+        let mut feeds_mm_s = lowered(&new.blocks, self.feeds_mm_s);
+        if feeds_mm_s == self.feeds_mm_s {
+            return feeds_mm_s;
+        }
+        for _ in 0..LOWERINGS {
+            let before = feeds_mm_s;
+            for (_, window) in others {
+                feeds_mm_s = lowered(&window.blocks, feeds_mm_s);
+            }
+            feeds_mm_s = lowered(&new.blocks, feeds_mm_s);
+            if feeds_mm_s == before {
+                return feeds_mm_s;
+            }
+        }
+        [0.0; 2]
+    }
+
+    /// The least time, in which a way without a blend counts for what it has to gain \[s\].
+    fn best_s(&self) -> f64 {
+        let time_s = |((crossing, _), plan): (&(Crossing<N>, Window), &Planned)| {
+            if crossing.blend().is_some() { plan.time_s } else { plan.time_s / (1.0 - EXACT_GAIN_MIN) }
+        };
+        self.crossings.iter().zip(&self.plans).map(time_s).fold(f64::INFINITY, f64::min)
     }
 
     /// Those that were added since this was said before are of one size; the first have no blend.
@@ -93,18 +126,15 @@ impl<'a, const N: usize> Compared<'a, N> {
         self.ends.push(self.crossings.len());
     }
 
-    /// Whether blends of the `left` sizes that are to be added can't be the best, if each gains no more than the last: ever
-    /// shorter ones are added.
+    /// Whether blends of the `left` sizes that are to be added are not expected to be the best: each may gain as much as the
+    /// last did. Ever shorter ones are added.
     pub(super) fn is_beyond(&self, left: usize) -> bool {
-        let [without, .., before, last] = self.ends[..] else { return false };
-        let start = self.ends[..self.ends.len() - 2].last().copied().unwrap_or(0);
+        let [.., start, before, last] = self.ends[..] else { return false };
         let (before, last) = (&self.plans[start..before], &self.plans[before..last]);
         let is_known = before.iter().chain(last).all(|plan| plan.time_s.is_finite());
-        let (exact_s, blended_s) = (least_s(&self.plans[..without]), least_s(&self.plans[without..]));
-        let best_s = blended_s.min(exact_s / (1.0 - EXACT_GAIN_MIN));
-        let (before_s, last_s) = (least_s(before), least_s(last));
+        let (best_s, before_s, last_s) = (self.best_s(), least_s(before), least_s(last));
         let gain_s = (before_s - last_s).max(0.0);
-        is_known && last_s > best_s * (1.0 + ALIKE) && last_s - left as f64 * gain_s > best_s
+        is_known && last_s - left as f64 * gain_s > CLEAR * best_s
     }
 
     /// The best: a blend, unless another way gains [`EXACT_GAIN_MIN`]; the one that is chosen if none has a plan.
@@ -130,7 +160,7 @@ impl<'a, const N: usize> Compared<'a, N> {
             |junction: Option<usize>| junction.and_then(crossing).map_or([0.0; 2], Crossing::trims_mm);
         let (first, last) = beside(self.run, self.junction);
         let mut blocks = Vec::with_capacity(BLOCKS);
-        let mut driven = 0;
+        let mut blend = None;
         for index in first..=last {
             let ([_, first_mm], [last_mm, _]) = (trims_mm(index.checked_sub(1)), trims_mm(Some(index)));
             let length_mm = self.run.length_mm(index) - first_mm - last_mm;
@@ -143,8 +173,8 @@ impl<'a, const N: usize> Compared<'a, N> {
                 law: ceiling.law,
             };
             blocks.push(block(length_mm, &self.ceilings[index].programmed, junction_mm_s));
-            if index == self.junction {
-                driven = blocks.len();
+            if index == self.junction && after.is_some_and(|crossing| crossing.blend().is_some()) {
+                blend = Some(blocks.len());
             }
             blocks.extend(
                 after
@@ -153,27 +183,30 @@ impl<'a, const N: usize> Compared<'a, N> {
                     .map(|driven| block(driven.bent.length_mm, &driven.ceilings.programmed, driven.end_mm_s)),
             );
         }
-        Window { blocks, driven }
+        Window { blocks, blend }
     }
 }
 
 impl Window {
     fn planned(&self, [start_mm_s, end_mm_s]: [f64; 2]) -> Planned {
-        let Some(driven) = self.blocks.get(self.driven) else {
-            return Planned { time_s: f64::INFINITY, is_level: false };
+        let before = &self.blocks[..self.blend.unwrap_or(0)];
+        let start_mm: f64 = before.iter().map(|block| block.length_mm).sum();
+        let (length_mm, cap_mm_s) = match self.blend.and_then(|blend| self.blocks.get(blend)) {
+            Some(blend) => (blend.length_mm, blend.cap_mm_s),
+            None => (0.0, f64::INFINITY),
         };
-        let start_mm: f64 = self.blocks[..self.driven].iter().map(|block| block.length_mm).sum();
-        let end_mm = start_mm + driven.length_mm;
+        let end_mm = start_mm + length_mm;
         let mut level_mm = 0.0;
         let mut add_level = |at_mm: f64, ramp: &Ramp<f64>| {
-            if ramp.is_cruise() && ramp.from_mm_s >= (1.0 - ALIKE) * driven.cap_mm_s && at_mm < end_mm {
+            if ramp.is_cruise() && ramp.from_mm_s >= (1.0 - ALIKE) * cap_mm_s && at_mm < end_mm {
                 level_mm += ((at_mm + ramp.length_mm()).min(end_mm) - at_mm.max(start_mm)).max(0.0);
             }
         };
         let mut nodes = [Node::EMPTY; nodes_for(BLOCKS)];
         let time_s = plan_spanning(&self.blocks, start_mm_s, end_mm_s, &mut nodes, &mut add_level);
+        let is_level = self.blend.is_some() && level_mm >= (1.0 - ALIKE) * length_mm;
         let time_s = time_s.ok().flatten().unwrap_or(f64::INFINITY);
-        Planned { time_s, is_level: time_s.is_finite() && level_mm >= (1.0 - ALIKE) * driven.length_mm }
+        Planned { time_s, is_level: is_level && time_s.is_finite() }
     }
 }
 
@@ -187,7 +220,7 @@ fn least_s(plans: &[Planned]) -> f64 {
 }
 
 /// Feeds at both ends that blocks can be planned with, at most `feeds` \[mm/s\].
-fn common_feeds(blocks: &[Block<f64>], mut feeds: [f64; 2]) -> [f64; 2] {
+fn lowered(blocks: &[Block<f64>], mut feeds: [f64; 2]) -> [f64; 2] {
     if blocks.iter().any(|block| !(block.length_mm > 0.0)) {
         return feeds;
     }

@@ -6,7 +6,7 @@
 use std::rc::Rc;
 
 use super::ceilings::Ceilings;
-use super::shapes::{Bent, Blended};
+use super::shapes::{MeasuredBlend, MeasuredCurve};
 use crate::toolpath::easement::Easement;
 
 /// How a junction is crossed.
@@ -84,7 +84,7 @@ pub(super) struct Eased<const N: usize> {
 /// A polynomial between moves with what planning knows of it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Driven<const N: usize> {
-    pub(super) bent: Rc<Bent<N>>,
+    pub(super) bent: Rc<MeasuredCurve<N>>,
     pub(super) ceilings: Ceilings,
     /// The greatest feed at its end \[mm/s\].
     pub(super) end_mm_s: f64,
@@ -93,7 +93,7 @@ pub(super) struct Driven<const N: usize> {
 /// A blend with what planning knows of it.
 #[derive(Clone, Debug)]
 pub(super) struct Rounding<const N: usize> {
-    pub(super) blended: Rc<Blended<N>>,
+    pub(super) blended: Rc<MeasuredBlend<N>>,
     /// The part of what its curvature allows with which it is driven.
     pub(super) share: f64,
     pub(super) driven: Driven<N>,

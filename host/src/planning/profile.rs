@@ -5,7 +5,7 @@ use motion_kernel::plan::BlockPlan;
 
 /// Positions closer than this are the same: ramps start and end on position steps, blocks do not.
 pub(super) const ROUNDING_MM: f64 = 1.0e-9;
-/// Steps to the time at which a ramp is at a place; most take six.
+/// Steps to the time at which a ramp is at a place.
 const STEPS_MAX: usize = 64;
 
 /// The feed over a stretch.
@@ -109,13 +109,17 @@ impl PlacedRamp {
             let feed = ramp.from_mm_s;
             return (feed, self.start_s + local_mm / feed);
         }
-        // The position grows with time: Newton's method between two times, or half of what is between them where its
-        // steps don't halve, as close to rest.
+        // The position grows with time: Newton's method between two times, or the middle of these where its steps don't
+        // halve: close to rest they get shorter by a quarter each.
         let (mut early_s, mut late_s) = (0.0, self.time_s());
         let mut time_s = late_s * (local_mm / self.length_mm());
         let mut step_before_s = late_s;
         let mut state = ramp.at(time_s);
+        let rounding_mm = 2.0 * f64::EPSILON * self.length_mm();
         for _ in 0..STEPS_MAX {
+            if (local_mm - state.s_mm).abs() <= rounding_mm {
+                break;
+            }
             if state.s_mm < local_mm {
                 early_s = time_s
             } else {

@@ -21,27 +21,27 @@ pub(super) struct Shapes<const N: usize> {
     /// Limits of the path in any direction.
     limits: Limits<f64>,
     axes: [Option<Axis>; N],
-    blends: Known<N, Option<Rc<Blended<N>>>>,
-    easements: Known<N, Rc<[EasedBy<N>]>>,
+    blends: ShapeCache<N, Option<Rc<MeasuredBlend<N>>>>,
+    easements: ShapeCache<N, Rc<[MeasuredEasement<N>]>>,
 }
 
 /// A blend, and how it bends, which is not asked of all.
 #[derive(Debug)]
-pub(super) struct Blended<const N: usize> {
+pub(super) struct MeasuredBlend<const N: usize> {
     pub(super) blend: Blend<N>,
-    bent: OnceCell<Rc<Bent<N>>>,
+    bent: OnceCell<Rc<MeasuredCurve<N>>>,
 }
 
 /// An easement, and how its sides bend.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct EasedBy<const N: usize> {
+pub(super) struct MeasuredEasement<const N: usize> {
     pub(super) easement: Rc<Easement<N>>,
-    pub(super) sides: Vec<Rc<Bent<N>>>,
+    pub(super) sides: Vec<Rc<MeasuredCurve<N>>>,
 }
 
 /// A polynomial between moves, and how it bends.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Bent<const N: usize> {
+pub(super) struct MeasuredCurve<const N: usize> {
     pub(super) element: Element<N>,
     pub(super) length_mm: f64,
     pub(super) greatest: Greatest<N>,
@@ -49,9 +49,10 @@ pub(super) struct Bent<const N: usize> {
 }
 
 impl<const N: usize> Shapes<N> {
-    /// None yet, for `limits` of the path in any direction, on a machine with these axes.
+    /// None yet, for `limits` of the path in any direction, those of the programmed moves, on a machine with these axes. Axes
+    /// that only these moves move bind what stands for them, too.
     pub(super) fn new(limits: Limits<f64>, axes: [Option<Axis>; N]) -> Self {
-        Self { limits, axes, blends: Known::default(), easements: Known::default() }
+        Self { limits, axes, blends: ShapeCache::default(), easements: ShapeCache::default() }
     }
 
     /// Limits of the path in any direction.
@@ -60,37 +61,42 @@ impl<const N: usize> Shapes<N> {
     }
 
     /// The blend of a junction with at most `room_mm` of either move; none where there is nothing to blend.
-    pub(super) fn blend(&self, run: &Run<N>, junction: usize, room_mm: f64) -> Option<Rc<Blended<N>>> {
+    pub(super) fn blend(&self, run: &Run<N>, junction: usize, room_mm: f64) -> Option<Rc<MeasuredBlend<N>>> {
         if !run.has_blend(junction) {
             return None;
         }
         self.blends.get_or_make(run, junction, [room_mm; 2], || {
             let blend = run.blend(junction, room_mm, &self.limits)?;
-            Some(Rc::new(Blended { blend, bent: OnceCell::new() }))
+            Some(Rc::new(MeasuredBlend { blend, bent: OnceCell::new() }))
         })
     }
 
     /// How a blend bends.
-    pub(super) fn bent(&self, blended: &Blended<N>) -> Rc<Bent<N>> {
+    pub(super) fn bent(&self, blended: &MeasuredBlend<N>) -> Rc<MeasuredCurve<N>> {
         blended.bent.get_or_init(|| Rc::new(self.bends(blended.blend.element))).clone()
     }
 
     /// The easements of a junction with at most `rooms_mm` of the two moves.
-    pub(super) fn easements(&self, run: &Run<N>, junction: usize, rooms_mm: [f64; 2]) -> Rc<[EasedBy<N>]> {
+    pub(super) fn easements(
+        &self,
+        run: &Run<N>,
+        junction: usize,
+        rooms_mm: [f64; 2],
+    ) -> Rc<[MeasuredEasement<N>]> {
         self.easements.get_or_make(run, junction, rooms_mm, || {
             let easements = run.easements(junction, rooms_mm).into_iter();
             let eased = |easement: Easement<N>| {
                 let sides = easement.elements.iter().map(|&element| Rc::new(self.bends(element)));
-                EasedBy { sides: sides.collect(), easement: Rc::new(easement) }
+                MeasuredEasement { sides: sides.collect(), easement: Rc::new(easement) }
             };
             easements.map(eased).collect()
         })
     }
 
     /// How an element bends takes a search along it.
-    fn bends(&self, element: Element<N>) -> Bent<N> {
+    fn bends(&self, element: Element<N>) -> MeasuredCurve<N> {
         let (greatest, ratios) = (element.greatest(), SpeedRatios::of(&element, &self.axes));
-        Bent { element, length_mm: element.length_mm(), greatest, ratios }
+        MeasuredCurve { element, length_mm: element.length_mm(), greatest, ratios }
     }
 }
 
@@ -98,7 +104,7 @@ impl<const N: usize> Shapes<N> {
 type Place<const N: usize> = ([u64; N], [u64; 3]);
 
 /// What was made of the elements of junctions, by their places.
-struct Known<const N: usize, T>(RefCell<HashMap<Place<N>, Vec<MadeOf<N, T>>>>);
+struct ShapeCache<const N: usize, T>(RefCell<HashMap<Place<N>, Vec<MadeOf<N, T>>>>);
 
 /// What was made of two elements.
 struct MadeOf<const N: usize, T> {
@@ -106,13 +112,13 @@ struct MadeOf<const N: usize, T> {
     made: T,
 }
 
-impl<const N: usize, T> Default for Known<N, T> {
+impl<const N: usize, T> Default for ShapeCache<N, T> {
     fn default() -> Self {
         Self(RefCell::default())
     }
 }
 
-impl<const N: usize, T: Clone> Known<N, T> {
+impl<const N: usize, T: Clone> ShapeCache<N, T> {
     /// What is made of a junction's elements within `rooms_mm` of either, if it was not made before.
     fn get_or_make(&self, run: &Run<N>, junction: usize, rooms_mm: [f64; 2], make: impl FnOnce() -> T) -> T {
         let elements = [junction, junction + 1].map(|index| run.moves()[index].element);
@@ -126,7 +132,9 @@ impl<const N: usize, T: Clone> Known<N, T> {
         drop(known);
         let made = make();
         let new = MadeOf { elements, made: made.clone() };
-        self.0.borrow_mut().entry(place).or_default().push(new);
+        let mut known = self.0.borrow_mut();
+        // Few have another one in their place.
+        known.entry(place).or_insert_with(|| Vec::with_capacity(1)).push(new);
         made
     }
 }
@@ -157,6 +165,19 @@ mod tests {
         for other in [blend(&corner, 0, 0.05), blend(&[[0.0, 0.0], [10.0, 0.0], [20.0, 10.0]], 0, 0.1)] {
             assert!(other.blend != first.blend);
         }
-        assert!(shapes.blend(&Run::exact(&path(&corner, 0.0, |_| 50.0)), 0, 0.1).is_none());
+        let tight = |tolerance_mm| shapes.blend(&Run::exact(&path(&corner, tolerance_mm, |_| 50.0)), 0, 0.1);
+        assert!(tight(0.02).expect("a corner").blend != first.blend && tight(0.0).is_none());
+    }
+
+    /// Easements likewise; their rooms on both sides count.
+    #[test]
+    fn easements_are_made_once() {
+        let machine = Machine::reference();
+        let moves = path(&[[0.0, 0.0], [10.0, 0.0], [20.0, 0.02]], 0.05, |_| 50.0);
+        let shapes = Shapes::new(in_any_direction(&moves, &machine), machine.letters_by_place());
+        let run = Run::exact(&moves);
+        let easements = |rooms_mm| shapes.easements(&run, 0, rooms_mm);
+        let [first, again, other] = [[1.0, 2.0], [1.0, 2.0], [2.0, 1.0]].map(easements);
+        assert!(!first.is_empty() && Rc::ptr_eq(&first, &again) && first != other);
     }
 }

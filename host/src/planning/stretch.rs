@@ -19,7 +19,7 @@ pub struct StretchBlock<const N: usize = 3> {
     pub line: u32,
     /// Geometry.
     pub element: Element<N>,
-    /// Its length \[mm\].
+    /// The geometry's arc length \[mm\].
     pub length_mm: f64,
     /// Ceiling with its reason, and the law for its ramps.
     pub ceiling: Ceiling<f64>,

@@ -83,8 +83,8 @@ pub struct Blend<const N: usize = 3> {
     pub trim_mm: f64,
     /// A bound on its distance from the path and the path's from it \[mm\].
     pub distance_mm: f64,
-    /// About the feed that it alone allows \[mm/s\].
-    pub feed_mm_s: f64,
+    /// About its greatest second to fourth derivative by arc length \[1/mm, 1/mm², 1/mm³\].
+    pub derivatives: [f64; 3],
 }
 
 impl<const N: usize> Blend<N> {
@@ -105,25 +105,26 @@ impl<const N: usize> Blend<N> {
         }
         let tolerance_mm = tolerance_mm * TOLERANCE_USED;
         let mut guess = corner.guess(tolerance_mm);
-        let mut best: Option<(f64, [f64; 3], Guess)> = None;
+        let mut best: Option<(f64, [f64; 3], [f64; 3], Guess)> = None;
         for shape in shapes(corner.angle_rad) {
             let Some((found, curve, _)) = corner.within(tolerance_mm, &shape, guess, COMPARED_STEPS) else {
                 continue;
             };
             guess = found;
-            let feed = feed_mm_s(&curve, limits);
+            let derivatives = derivatives(&curve);
+            let feed = feed_within(limits, derivatives);
             if best.is_none_or(|(most, ..)| feed > most) && feed.is_finite() && feed > 0.0 {
-                best = Some((feed, shape, found));
+                best = Some((feed, derivatives, shape, found));
             }
         }
-        let (feed_mm_s, shape, guess) = best?;
+        let (_, derivatives, shape, guess) = best?;
         let (Guess { trim_mm, .. }, curve, distance_mm) =
             corner.within(tolerance_mm, &shape, guess, MEASURED_STEPS)?;
         let (start, _) = corner.before.at(trim_mm);
         let (end, _) = corner.after.at(trim_mm);
         let (from, to) = (add(corner.point, start), add(corner.point, end));
         let element = Element::Polynomial { from, to, shape: curve, role: Role::Blend };
-        Some(Self { element, trim_mm, distance_mm, feed_mm_s })
+        Some(Self { element, trim_mm, distance_mm, derivatives })
     }
 }
 
@@ -148,17 +149,17 @@ pub fn trim_mm(angle_rad: f64, tolerance_mm: f64) -> f64 {
     tolerance_mm / (2.0 * part * libm::sin(0.5 * angle_rad))
 }
 
-/// The greatest feed at which a curve alone keeps the limits \[mm/s\].
+/// About the greatest second to fourth derivative of a curve by arc length \[1/mm, 1/mm², 1/mm³\].
 #[must_use]
-pub fn feed_mm_s<const N: usize>(curve: &Polynomial<N>, limits: &Limits<f64>) -> f64 {
+pub fn derivatives<const N: usize>(curve: &Polynomial<N>) -> [f64; 3] {
     let bend = curve.bend_of(COMPARED_PARTS);
     let third = bend.third_root_per_mm * bend.third_root_per_mm;
-    feed_within(limits, [bend.curvature_per_mm, third, bend.fourth_root_per_mm.powi(3)])
+    [bend.curvature_per_mm, third, bend.fourth_root_per_mm.powi(3)]
 }
 
 /// The greatest feed within the limits where the second to fourth derivative by arc length are so great
 /// \[1/mm, 1/mm², 1/mm³\].
-pub(super) fn feed_within(limits: &Limits<f64>, [second, third, fourth]: [f64; 3]) -> f64 {
+pub(crate) fn feed_within(limits: &Limits<f64>, [second, third, fourth]: [f64; 3]) -> f64 {
     let by_accel = (limits.accel_mm_s2 / second).sqrt();
     let by_jerk = libm::cbrt(limits.jerk_mm_s3 / third);
     let by_snap = (limits.snap_mm_s4 / fourth).sqrt().sqrt();
@@ -577,7 +578,8 @@ mod tests {
         assert!(blend.trim_mm > 0.5 && blend.trim_mm < 3.0, "{}", blend.trim_mm);
         let Element::Polynomial { shape, .. } = blend.element else { panic!("a polynomial") };
         // Faster than the curvature's step lets pass, 500 mm/s² · 5 mm: 50 mm/s; the arc itself allows 50.
-        assert!(feed_mm_s(&shape, &LIMITS) > 20.0, "{}", feed_mm_s(&shape, &LIMITS));
+        let feed_mm_s = feed_within(&LIMITS, derivatives(&shape));
+        assert!(feed_mm_s > 20.0, "{feed_mm_s}");
     }
 
     /// Against the nearest of many points of the arc.
@@ -616,7 +618,7 @@ mod tests {
         let feed = |limits: &Limits<f64>, under: &Limits<f64>| {
             let blend = Blend::new(&before, &after, 0.05, 1e3, limits).expect("a blend");
             let Element::Polynomial { shape, .. } = blend.element else { panic!("a polynomial") };
-            feed_mm_s(&shape, under)
+            feed_within(under, derivatives(&shape))
         };
         let jerk = Limits { snap_mm_s4: 1e9, ..LIMITS };
         let snap = Limits { accel_mm_s2: 1e9, jerk_mm_s3: 1e9, ..LIMITS };

@@ -16,7 +16,7 @@ pub trait Curve<const N: usize = 3> {
         norm(self.derivatives(u)[0])
     }
 
-    /// The same at several places.
+    /// |r'| at four places.
     fn speeds(&self, places: [f64; LANES]) -> [f64; LANES] {
         places.map(|u| self.speed(u))
     }
@@ -38,6 +38,7 @@ pub(super) fn gauss_4<const N: usize>(curve: &(impl Curve<N> + ?Sized), a: f64, 
     by_points(curve, a, b, &GAUSS_4)
 }
 
+/// The same by points on either side of the middle: abscissae and weights, two and two.
 fn by_points<const N: usize>(
     curve: &(impl Curve<N> + ?Sized),
     a: f64,

@@ -57,7 +57,7 @@ fn greater(a: f64, b: f64) -> f64 {
 fn of_piece<const N: usize>(piece: &Septic<N>) -> [f64; 3] {
     let mut peaks = [Peak::default(); 3];
     for first in (0..=PIECE_PARTS).step_by(LANES) {
-        let places = core::array::from_fn(|lane| (first + lane) as f64 / PIECE_PARTS as f64);
+        let places = core::array::from_fn(|lane| (first + lane).min(PIECE_PARTS) as f64 / PIECE_PARTS as f64);
         let derivatives = piece.second_to_fourth(f64x4::from(places));
         for (peak, derivative) in peaks.iter_mut().zip(derivatives) {
             let norms = norm(derivative).to_array();

@@ -1,9 +1,9 @@
 //! Numbers one by one, or four at once.
 //!
 //! What is computed at many places of a curve is computed at four of them by the same instructions. Each lane has the bits
-//! that one number has.
+//! that one number has, but for the sign of 0.
 
-use core::ops::{Add, AddAssign, Div, Mul, Sub, SubAssign};
+use core::ops::{Add, AddAssign, Div, Mul, MulAssign, Sub, SubAssign};
 
 use wide::f64x4;
 
@@ -19,6 +19,7 @@ pub(crate) trait Lanes:
     + Div<Output = Self>
     + AddAssign
     + SubAssign
+    + MulAssign
 {
     /// The same number in each.
     fn of(number: f64) -> Self;

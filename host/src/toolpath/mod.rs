@@ -82,7 +82,7 @@ pub(crate) fn subtract<T: Lanes, const N: usize>(mut a: [T; N], b: [T; N]) -> [T
 #[inline]
 pub(crate) fn scale<T: Lanes, const N: usize>(mut a: [T; N], factor: T) -> [T; N] {
     for component in &mut a {
-        *component = *component * factor;
+        *component *= factor;
     }
     a
 }

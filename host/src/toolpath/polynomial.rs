@@ -182,6 +182,15 @@ fn first_about<T: Lanes, const N: usize>(
     coefficients
 }
 
+/// First derivative at `u` of a curve with these coefficients.
+fn slope<T: Lanes, const N: usize>(coefficients: &[Vector<N>; DEGREE], u: T) -> [T; N] {
+    let mut slope = [T::of(0.0); N];
+    for (index, &coefficient) in coefficients.iter().enumerate().rev() {
+        slope = add(scale(slope, u), scale(coefficient, (index + 1) as f64).map(T::of));
+    }
+    slope
+}
+
 /// First to fourth derivative where the curve has these coefficients.
 fn four<T: Lanes, const N: usize>([c1, c2, c3, c4, ..]: [[T; N]; DEGREE]) -> [[T; N]; 4] {
     [c1, scale(c2, T::of(2.0)), scale(c3, T::of(6.0)), scale(c4, T::of(24.0))]
@@ -199,21 +208,11 @@ impl<const N: usize> Curve<N> for Polynomial<N> {
     }
 
     fn speed(&self, u: f64) -> f64 {
-        let mut slope = [0.0; N];
-        for (index, &coefficient) in self.coefficients.iter().enumerate().rev() {
-            slope = add(scale(slope, u), scale(coefficient, (index + 1) as f64));
-        }
-        norm(slope)
+        norm(slope(&self.coefficients, u))
     }
 
     fn speeds(&self, places: [f64; LANES]) -> [f64; LANES] {
-        let u = f64x4::from(places);
-        let mut slope = [f64x4::of(0.0); N];
-        for (index, &coefficient) in self.coefficients.iter().enumerate().rev() {
-            let of_power = scale(coefficient, (index + 1) as f64).map(f64x4::of);
-            slope = add(scale(slope, u), of_power);
-        }
-        norm(slope).to_array()
+        norm(slope(&self.coefficients, f64x4::from(places))).to_array()
     }
 
     fn length(&self, a: f64, b: f64) -> f64 {

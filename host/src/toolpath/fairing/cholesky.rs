@@ -30,7 +30,7 @@ impl<const N: usize> Cholesky<N> {
     }
 
     /// Makes it the other, which has as many points.
-    pub(super) fn copy(&mut self, other: &Self) {
+    pub(super) fn copy_from(&mut self, other: &Self) {
         self.columns.copy_from_slice(&other.columns);
     }
 

@@ -376,8 +376,9 @@ fn promised_mm_s<const N: usize>(guide: &Guide<N>, mesh: &Mesh, limits: &Limits<
 }
 
 impl<const N: usize> Window<'_, N> {
-    /// The spans as they stand, and what the next window begins with; or those that are farther from the path
-    /// than their tolerance or can't be driven, with what the tolerance has to be made smaller by.
+    /// The spans as they stand, and what the next window begins with; or those that are farther from the path than their
+    /// tolerance, with what it has to be made smaller by. Where none is, those that can't be driven: how a span is driven takes
+    /// longer to find out.
     fn made(&self, problem: &Problem<N>) -> Result<(Vec<Span<N>>, Start<N>), TooFar> {
         let (guide, breaks) = (self.guide, problem.breaks());
         let kept = breaks.partition_point(|&mm| mm < self.end_mm);
@@ -638,7 +639,8 @@ mod tests {
             let spans = fair(&lines(&points, tolerance_mm), &LIMITS).expect("a curve");
             let of_span = |span: &Span| {
                 let (_, shape) = shape(span);
-                shape.length(0.0, 1.0) / super::super::blend::feed_mm_s(&shape, &LIMITS).min(60.0)
+                let derivatives = super::super::blend::derivatives(&shape);
+                shape.length(0.0, 1.0) / super::super::blend::feed_within(&LIMITS, derivatives).min(60.0)
             };
             spans.iter().map(of_span).sum::<f64>()
         };

@@ -80,7 +80,7 @@ struct Bending {
 }
 
 /// Second to fourth derivative at the points of the quadrature on one span.
-type Bent<const N: usize> = [[Vector<N>; 3]; GAUSS.len()];
+type SpanDerivatives<const N: usize> = [[Vector<N>; 3]; GAUSS.len()];
 
 /// The problem and where its solution stands.
 pub(super) struct Problem<'a, const N: usize> {
@@ -91,7 +91,7 @@ pub(super) struct Problem<'a, const N: usize> {
     bendings: Vec<Bending>,
     control: Vec<Vector<N>>,
     /// How the curve of these control points bends on each span.
-    bent: Vec<Bent<N>>,
+    bent: Vec<SpanDerivatives<N>>,
     /// Control points that the end has decided.
     decided_at_end: usize,
     /// What bending adds to the equations, Σ factor·row·rowᵀ of all points, at these costs.
@@ -135,7 +135,7 @@ impl<'a, const N: usize> Problem<'a, N> {
         let samples = samples(guide, breaks, &knots, end.is_none());
         let decided_at_end = if end.is_some() { DECIDED } else { 0 };
         let bent = vec![[[[0.0; N]; 3]; GAUSS.len()]; bendings.len()];
-        let [of_bending, equations] = [(); 2].map(|()| Cholesky::new(points));
+        let (of_bending, equations) = (Cholesky::new(points), Cholesky::new(points));
         let mut problem =
             Self { breaks, knots, samples, bendings, control, bent, decided_at_end, of_bending, equations };
         problem.measure();
@@ -276,7 +276,7 @@ impl<'a, const N: usize> Problem<'a, N> {
     pub(super) fn step(&mut self, gap_aim: f64) -> Option<f64> {
         add_work(self.bendings.len() + self.samples.len());
         let per_sample = gap_aim / self.samples.len() as f64;
-        self.equations.copy(&self.of_bending);
+        self.equations.copy_from(&self.of_bending);
         let mut slope = vec![[0.0; N]; self.control.len()];
         for (span, (bending, bent)) in self.bendings.iter().zip(&self.bent).enumerate() {
             let rows = bending.rows.iter().flatten();
@@ -350,7 +350,7 @@ impl<'a, const N: usize> Problem<'a, N> {
 
     /// The feed at which each span alone keeps the limits \[mm/s\].
     pub(super) fn allowed_mm_s(&self, limits: &Limits<f64>) -> Vec<f64> {
-        let of_span = |bent: &Bent<N>| {
+        let of_span = |bent: &SpanDerivatives<N>| {
             let mut greatest = [0.0_f64; 3];
             for derivatives in bent {
                 for (greatest, &derivative) in greatest.iter_mut().zip(derivatives) {
