@@ -235,7 +235,7 @@ impl<'a, const N: usize> Junctions<'a, N> {
         self.shapes.blend(&self.run, junction, room_mm)
     }
 
-    /// About the time that the run takes with blends, of which those `alone` are the longest, in these rooms \[s\]: rather less,
+    /// About the time that the run takes with blends, of which those `alone` are the longest, cut to these rooms \[s\]: rather less,
     /// because each is as fast as the longest by itself within the limits of the path, whatever those of the axes are, and
     /// leaves all of the limits to ramps. Rotary axes may relax the limits of the path: then it is nothing.
     fn about_s(&self, alone: &[Option<Rc<MeasuredBlend<N>>>], rooms_mm: &[f64]) -> AtLine<f64> {
@@ -249,9 +249,9 @@ impl<'a, const N: usize> Junctions<'a, N> {
         else {
             return Ok(0.0);
         };
-        let trim_mm = |junction: Option<usize>| match junction.and_then(|junction| alone.get(junction)) {
-            Some(Some(blended)) => blended.blend.trim_mm.min(rooms_mm[junction.unwrap_or(0)]),
-            _ => 0.0,
+        let trim_mm = |junction: Option<usize>| {
+            let blended = junction.filter(|&junction| alone.get(junction).is_some_and(Option::is_some));
+            blended.map_or(0.0, |junction| rooms_mm[junction])
         };
         let (mut time_s, mut blocks) = (0.0, Vec::new());
         for (index, Ceilings { programmed, .. }) in self.ceilings.iter().enumerate() {
@@ -266,7 +266,7 @@ impl<'a, const N: usize> Junctions<'a, N> {
             blocks.push(Block { length_mm, cap_mm_s, junction_mm_s, law });
             if let Some(Some(blended)) = after {
                 let (from, to) = blended.blend.element.ends_mm();
-                let length_mm = norm(subtract(to, from)) * (trim_mm(Some(index)) / blended.blend.trim_mm);
+                let length_mm = norm(subtract(to, from)) * (rooms_mm[index] / blended.blend.trim_mm);
                 let next_mm_s = self.ceilings[index + 1].programmed.feed_mm_s;
                 let cap_mm_s = feed_within(&path, blended.blend.derivatives).min(cap_mm_s).min(next_mm_s);
                 blocks.push(Block { length_mm, cap_mm_s, junction_mm_s: f64::INFINITY, law: all });

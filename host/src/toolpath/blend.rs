@@ -151,7 +151,7 @@ pub fn trim_mm(angle_rad: f64, tolerance_mm: f64) -> f64 {
 
 /// About the greatest second to fourth derivative of a curve by arc length \[1/mm, 1/mm², 1/mm³\].
 #[must_use]
-pub fn derivatives<const N: usize>(curve: &Polynomial<N>) -> [f64; 3] {
+pub(crate) fn derivatives<const N: usize>(curve: &Polynomial<N>) -> [f64; 3] {
     let bend = curve.bend_of(COMPARED_PARTS);
     let third = bend.third_root_per_mm * bend.third_root_per_mm;
     [bend.curvature_per_mm, third, bend.fourth_root_per_mm.powi(3)]
