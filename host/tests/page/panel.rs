@@ -113,9 +113,11 @@ pub(crate) fn a_key_jogs_while_it_is_down() {
     let place = browser.middle("[data-key='Y+']");
     browser.drag(&[place, place]);
     wait(&browser, "document.querySelectorAll('.positions td')[2].textContent === '1.000 mm'");
+    // Shown in micrometres, it is there before the axis rests.
+    wait(&browser, &state("idle"));
     browser.run("document.querySelector('[data-of=distance]').value = ''; document.activeElement.blur()");
     browser.key_down(RIGHT);
-    wait(&browser, &state("moving"));
+    wait(&browser, "parseFloat(document.querySelector('.positions td').textContent) > 0");
     browser.key_up(RIGHT);
     wait(&browser, &state("ready"));
     let x_mm = browser.number("parseFloat(document.querySelector('.positions td').textContent)");
