@@ -32,15 +32,15 @@ use std::cell::OnceCell;
 use std::rc::Rc;
 
 use motion_kernel::law::Law;
-use motion_kernel::plan::{BLEND_FEED_SHARE, Block, Ceiling, Node, nodes_for, plan_spanning};
+use motion_kernel::plan::{BLEND_FEED_SHARE, Block, Node, nodes_for, plan_spanning};
 
 use super::Mode;
-use super::ceilings::{Ceilings, along, ceilings, in_any_direction, junction_feed};
+use super::ceilings::{Ceilings, along, ceilings, in_any_direction};
 use super::compared::{BESIDE, Compared, EXACT_GAIN_MIN};
-use super::crossing::{By, Crossing, Driven, Eased, Rounding};
+use super::crossing::{By, Crossing, Driven, Rounding};
 use super::error::AtLine;
 use super::lookahead::lookahead;
-use super::shapes::{MeasuredBlend, MeasuredCurve, MeasuredEasement, Shapes};
+use super::shapes::{MeasuredBlend, MeasuredCurve, Shapes};
 use super::stretch::StretchBlock;
 use crate::machine::Machine;
 use crate::toolpath::blend::feed_within;
@@ -53,8 +53,6 @@ const FLAT_CORNER_RAD: f64 = 75.0 * core::f64::consts::PI / 180.0;
 
 /// Lengths of blends that are tried, as parts of the longest one.
 const SIZES: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
-/// Lengths of easements that are tried, as parts of what there is room for.
-const EASEMENT_SIZES: [f64; 2] = [1.0, 0.25];
 /// How much longer than the best found the longest blends may take for others to be tried: these gain up to
 /// an eighth.
 const PROMISING: f64 = 1.15;
@@ -121,16 +119,16 @@ struct Timed<const N: usize> {
 }
 
 /// The junctions of a run.
-struct Junctions<'a, const N: usize> {
-    run: Run<N>,
-    shapes: &'a Shapes<N>,
+pub(super) struct Junctions<'a, const N: usize> {
+    pub(super) run: Run<N>,
+    pub(super) shapes: &'a Shapes<N>,
     /// The ceilings of the moves.
-    ceilings: Vec<Ceilings>,
+    pub(super) ceilings: Vec<Ceilings>,
     /// Which junctions are kinks that might be passed under G61, but are to be smooth.
-    are_eased: Vec<bool>,
+    pub(super) are_eased: Vec<bool>,
     /// Each junction without a blend, once it was asked for.
-    exact: Vec<OnceCell<Crossing<N>>>,
-    machine: &'a Machine<N>,
+    pub(super) exact: Vec<OnceCell<Crossing<N>>>,
+    pub(super) machine: &'a Machine<N>,
 }
 
 impl<'a, const N: usize> Junctions<'a, N> {
@@ -285,7 +283,7 @@ impl<'a, const N: usize> Junctions<'a, N> {
     }
 
     /// The same, at most half of either move.
-    fn halves_mm(&self, junction: usize, trims_mm: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
+    pub(super) fn halves_mm(&self, junction: usize, trims_mm: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
         self.run.halves_mm(junction, self.other_trims_mm(junction, trims_mm))
     }
 
@@ -306,11 +304,11 @@ impl<'a, const N: usize> Junctions<'a, N> {
         }
         let mut settled = exact.clone();
         self.settle(&mut settled, |junction, settled| {
-            let easements = match settled[junction].by {
-                By::Easement(_) => self.easements(junction, settled)?,
-                By::Itself | By::Blend(_) => Vec::new(),
-            };
-            Ok(self.best_of(junction, easements, settled))
+            let mut compared = Compared::new(&self.run, &self.ceilings, junction, settled);
+            if let By::Easement(_) = settled[junction].by {
+                self.add_easements(&mut compared, junction, settled)?;
+            }
+            Ok(compared.best())
         })?;
         Ok(if self.timed(&settled).time_s < self.timed(&exact).time_s { settled } else { exact })
     }
@@ -323,83 +321,6 @@ impl<'a, const N: usize> Junctions<'a, N> {
             blocks[junction].junction_mm_s = f64::INFINITY;
         }
         run_time_s(&blocks, self.machine.tick_s)
-    }
-
-    /// A junction without a blend; a kink that might be passed, but for the step of velocity, with the fastest of its easements
-    /// within half of its moves.
-    fn exact_at(&self, junction: usize) -> AtLine<Crossing<N>> {
-        let exact = &self.exact[junction];
-        if let Some(known) = exact.get() {
-            return Ok(known.clone());
-        }
-        let made = self.made_exact_at(junction)?;
-        Ok(exact.get_or_init(|| made).clone())
-    }
-
-    fn made_exact_at(&self, junction: usize) -> AtLine<Crossing<N>> {
-        if self.are_eased[junction] {
-            let eased = self.eased(junction, self.halves_mm(junction, |_| [0.0; 2]))?.into_iter();
-            let fastest = eased.max_by(|one, other| one.feed_mm_s.total_cmp(&other.feed_mm_s));
-            if let Some(fastest) = fastest {
-                return Ok(fastest);
-            }
-        }
-        let [before, after] = [junction, junction + 1]
-            .map(|index| (&self.run.moves()[index], &self.ceilings[index].programmed));
-        let elements = [&before.0.element, &after.0.element];
-        let feed_mm_s = junction_feed(elements, self.run.kink_rad(junction).is_some(), self.machine);
-        let feed_mm_s = feed_mm_s.min(before.1.feed_mm_s).min(after.1.feed_mm_s);
-        Ok(Crossing { by: By::Itself, feed_mm_s })
-    }
-
-    /// A junction with each of its easements within `rooms_mm`.
-    fn eased(&self, junction: usize, rooms_mm: [f64; 2]) -> AtLine<Vec<Crossing<N>>> {
-        let easements = self.shapes.easements(&self.run, junction, rooms_mm);
-        easements.iter().map(|eased| self.eased_by(junction, eased)).collect()
-    }
-
-    /// A junction with an easement.
-    fn eased_by(
-        &self,
-        junction: usize,
-        MeasuredEasement { easement, sides }: &MeasuredEasement<N>,
-    ) -> AtLine<Crossing<N>> {
-        let share = self.machine.path.curve_feed_share;
-        let sides = sides.iter().map(|side| self.driven(junction, side, share));
-        let mut sides = sides.collect::<AtLine<Vec<_>>>()?;
-        // What meets there.
-        let [before, after] = [junction, junction + 1].map(|index| &self.run.moves()[index].element);
-        let met = match (&easement.elements[..], easement.trims_mm) {
-            ([first, second], _) => [first, second],
-            ([only], [_, 0.0]) => [only, after],
-            ([only], _) => [before, only],
-            _ => [before, after],
-        };
-        let junction_mm_s = junction_feed(met, true, self.machine);
-        // Ramps have more of the limits below what they can reach from the junction.
-        let most = [&self.ceilings[junction], &self.ceilings[junction + 1]].into_iter();
-        let most = most.chain(sides.iter().map(|side| &side.ceilings)).map(|of| of.greatest.feed_mm_s);
-        let most_mm_s = most.fold(junction_mm_s, f64::min);
-        let trims_mm = easement.trims_mm[0] + easement.trims_mm[1];
-        let reach_mm_s = (most_mm_s.powi(2) + 2.0 * self.shapes.limits().accel_mm_s2 * trims_mm).sqrt();
-        for side in &mut sides {
-            if side.ceilings.programmed.feed_mm_s > reach_mm_s {
-                let reason = side.ceilings.programmed.reason;
-                let MeasuredCurve { greatest, ratios, .. } = &*side.bent;
-                let lowered = ceilings(reach_mm_s, greatest, ratios, share, self.machine);
-                let lowered = lowered.map_err(|error| (self.run.moves()[junction].line, error.into()))?;
-                let lowered = Ceiling { reason, ..lowered.programmed };
-                side.ceilings = Ceilings { programmed: lowered, greatest: lowered, ..side.ceilings };
-            }
-        }
-        if easement.trims_mm[0] > 0.0
-            && let Some(first) = sides.first_mut()
-        {
-            first.end_mm_s = junction_mm_s;
-        }
-        let feeds = sides.iter().map(|side| side.ceilings.programmed.feed_mm_s);
-        let feed_mm_s = feeds.fold(junction_mm_s, f64::min);
-        Ok(Crossing { feed_mm_s, by: By::Easement(Rc::new(Eased { easement: easement.clone(), sides })) })
     }
 
     /// A junction with a blend, driven at a share.
@@ -417,7 +338,12 @@ impl<'a, const N: usize> Junctions<'a, N> {
     }
 
     /// What is put in the place of a junction, driven at a share.
-    fn driven(&self, junction: usize, bent: &Rc<MeasuredCurve<N>>, share: f64) -> AtLine<Driven<N>> {
+    pub(super) fn driven(
+        &self,
+        junction: usize,
+        bent: &Rc<MeasuredCurve<N>>,
+        share: f64,
+    ) -> AtLine<Driven<N>> {
         let [before, after] = [junction, junction + 1].map(|index| &self.run.moves()[index]);
         let feed_mm_s = before.feeds.least(after.feeds).along(&bent.ratios);
         let ceilings = ceilings(feed_mm_s, &bent.greatest, &bent.ratios, share, self.machine)
@@ -436,13 +362,9 @@ impl<'a, const N: usize> Junctions<'a, N> {
         let rooms_mm = self.rooms_mm(junction, |junction| chosen[junction].trims_mm());
         let longest_mm = least(rooms_mm).min(alone.blend.trim_mm);
         let mut compared = Compared::new(&self.run, &self.ceilings, junction, chosen);
-        let easements = self.easements(junction, chosen)?;
-        if easements.is_empty() {
+        if !self.add_easements(&mut compared, junction, chosen)? {
             compared.add(self.exact_at(junction)?);
         }
-        easements.into_iter().for_each(|eased| {
-            compared.add(eased);
-        });
         compared.end_size();
         for (index, size) in SIZES.into_iter().enumerate() {
             let room_mm = size * longest_mm;
@@ -453,8 +375,9 @@ impl<'a, const N: usize> Junctions<'a, N> {
             };
             match blended {
                 Some(blended) => {
+                    compared.add(self.rounded(junction, &blended, BLEND_FEED_SHARE)?);
                     // What is as fast as its curvature allows all along, and no better, has no use for ramps on it.
-                    if !compared.add(self.rounded(junction, &blended, BLEND_FEED_SHARE)?) {
+                    if !compared.is_level_in_vain() {
                         let share = self.machine.path.curve_feed_share;
                         compared.add(self.rounded(junction, &blended, share)?);
                     }
@@ -470,20 +393,6 @@ impl<'a, const N: usize> Junctions<'a, N> {
         Ok(compared.best())
     }
 
-    /// A kink that might be passed under G61 with easements of some lengths, in the room that the others, crossed as `chosen`
-    /// says, leave it, but at most half of either move: one that takes more leaves the next kink next to nothing.
-    fn easements(&self, junction: usize, chosen: &[Crossing<N>]) -> AtLine<Vec<Crossing<N>>> {
-        if !self.are_eased[junction] {
-            return Ok(Vec::new());
-        }
-        let rooms_mm = self.halves_mm(junction, |junction| chosen[junction].trims_mm());
-        let mut all = Vec::with_capacity(3 * EASEMENT_SIZES.len());
-        for part in EASEMENT_SIZES {
-            all.extend(self.eased(junction, rooms_mm.map(|room_mm| part * room_mm))?);
-        }
-        Ok(all)
-    }
-
     /// The best of some crossings of a junction, the others being crossed as `chosen` says.
     fn best_of(
         &self,
@@ -492,9 +401,7 @@ impl<'a, const N: usize> Junctions<'a, N> {
         chosen: &[Crossing<N>],
     ) -> Crossing<N> {
         let mut compared = Compared::new(&self.run, &self.ceilings, junction, chosen);
-        crossings.into_iter().for_each(|crossing| {
-            compared.add(crossing);
-        });
+        crossings.into_iter().for_each(|crossing| compared.add(crossing));
         compared.best()
     }
 

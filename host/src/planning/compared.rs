@@ -38,7 +38,7 @@ pub(super) struct Compared<'a, const N: usize> {
     /// Feeds at both ends of the neighbourhood, with which all crossings can be planned \[mm/s\].
     feeds_mm_s: [f64; 2],
     crossings: Vec<(Crossing<N>, Window)>,
-    /// The plans of the first crossings, in their order.
+    /// The plans of the first crossings, in their order; of all, once they were asked for.
     plans: Vec<Planned>,
     /// Where those of one size end.
     ends: Vec<usize>,
@@ -76,10 +76,8 @@ impl<'a, const N: usize> Compared<'a, N> {
         Self { run, ceilings, junction, chosen, feeds_mm_s, crossings, plans, ends }
     }
 
-    /// Compares one more; whether it is a blend that is no better than those before, though it is driven at its ceiling all
-    /// along.
-    pub(super) fn add(&mut self, crossing: Crossing<N>) -> bool {
-        let before_s = self.best_s();
+    /// Adds one more.
+    pub(super) fn add(&mut self, crossing: Crossing<N>) {
         let window = self.window(&crossing);
         self.crossings.push((crossing, window));
         let feeds_mm_s = self.common_feeds();
@@ -87,9 +85,20 @@ impl<'a, const N: usize> Compared<'a, N> {
             self.feeds_mm_s = feeds_mm_s;
             self.plans.clear();
         }
+    }
+
+    /// The plans of all, of which those that are there are not made anew.
+    fn plans(&mut self) -> &[Planned] {
         let new = self.crossings[self.plans.len()..].iter();
-        self.plans.extend(new.map(|(_, window)| window.planned(feeds_mm_s)));
-        self.plans.last().is_some_and(|last| last.is_level && last.time_s >= before_s)
+        self.plans.extend(new.map(|(_, window)| window.planned(self.feeds_mm_s)));
+        &self.plans
+    }
+
+    /// Whether the last is a blend that is no better than those before, though it is driven at its ceiling all along.
+    pub(super) fn is_level_in_vain(&mut self) -> bool {
+        let Some((&last, before)) = self.plans().split_last() else { return false };
+        let before = before.len();
+        last.is_level && last.time_s >= self.best_s(before)
     }
 
     /// Feeds at both ends that all crossings, of which the last is new, can be planned with \[mm/s\]: at most those that the
@@ -113,12 +122,12 @@ impl<'a, const N: usize> Compared<'a, N> {
         [0.0; 2]
     }
 
-    /// The least time, in which a way without a blend counts for what it has to gain \[s\].
-    fn best_s(&self) -> f64 {
+    /// The least time of the first so many, in which a way without a blend counts for what it has to gain \[s\].
+    fn best_s(&self, count: usize) -> f64 {
         let time_s = |((crossing, _), plan): (&(Crossing<N>, Window), &Planned)| {
             if crossing.blend().is_some() { plan.time_s } else { plan.time_s / (1.0 - EXACT_GAIN_MIN) }
         };
-        self.crossings.iter().zip(&self.plans).map(time_s).fold(f64::INFINITY, f64::min)
+        self.crossings.iter().zip(&self.plans).take(count).map(time_s).fold(f64::INFINITY, f64::min)
     }
 
     /// Those that were added since this was said before are of one size; the first have no blend.
@@ -128,17 +137,20 @@ impl<'a, const N: usize> Compared<'a, N> {
 
     /// Whether blends of the `left` sizes that are to be added are not expected to be the best: each may gain as much as the
     /// last did. Ever shorter ones are added.
-    pub(super) fn is_beyond(&self, left: usize) -> bool {
+    pub(super) fn is_beyond(&mut self, left: usize) -> bool {
         let [.., start, before, last] = self.ends[..] else { return false };
-        let (before, last) = (&self.plans[start..before], &self.plans[before..last]);
+        let plans = self.plans();
+        let (before, last) = (&plans[start..before], &plans[before..last]);
         let is_known = before.iter().chain(last).all(|plan| plan.time_s.is_finite());
-        let (best_s, before_s, last_s) = (self.best_s(), least_s(before), least_s(last));
+        let (before_s, last_s) = (least_s(before), least_s(last));
+        let best_s = self.best_s(self.plans.len());
         let gain_s = (before_s - last_s).max(0.0);
         is_known && last_s - left as f64 * gain_s > CLEAR * best_s
     }
 
     /// The best: a blend, unless another way gains [`EXACT_GAIN_MIN`]; the one that is chosen if none has a plan.
-    pub(super) fn best(self) -> Crossing<N> {
+    pub(super) fn best(mut self) -> Crossing<N> {
+        self.plans();
         let mut best = (&self.chosen[self.junction], f64::INFINITY);
         for has_blend in [true, false] {
             let gain = if has_blend { 0.0 } else { EXACT_GAIN_MIN };
@@ -242,7 +254,7 @@ fn lowered(blocks: &[Block<f64>], mut feeds: [f64; 2]) -> [f64; 2] {
 #[cfg(test)]
 impl<const N: usize> Compared<'_, N> {
     /// The times of those that were added, in their order \[s\].
-    pub(super) fn times_s(&self) -> Vec<f64> {
-        self.plans.iter().map(|plan| plan.time_s).collect()
+    pub(super) fn times_s(&mut self) -> Vec<f64> {
+        self.plans().iter().map(|plan| plan.time_s).collect()
     }
 }
