@@ -24,28 +24,62 @@ const FIGURES: [Figure; 5] = [
     ("instructions", |tick| tick.instructions),
     ("estimated cycles, M4 zero-wait-state, nominal", |tick| tick.nominal_cycles),
     ("estimated cycles, M4 zero-wait-state, pessimistic", |tick| tick.pessimistic_cycles),
-    ("estimated cycles, with flash and interrupt, nominal", |tick| {
-        tick.nominal_cycles + tick.nominal_waits + u64::from(INTERRUPT.nominal)
-    }),
-    ("estimated cycles, with flash and interrupt, pessimistic", |tick| {
-        tick.pessimistic_cycles + tick.pessimistic_waits + u64::from(INTERRUPT.pessimistic)
-    }),
+    ("estimated cycles, with flash and interrupt, nominal", nominal),
+    ("estimated cycles, with flash and interrupt, pessimistic", pessimistic),
 ];
+/// Both sides of the estimate with flash and interrupt.
+const SIDES: [Figure; 2] = [("nominal", nominal), ("pessimistic", pessimistic)];
+
+fn nominal(tick: &Estimate) -> u64 {
+    tick.nominal_cycles + tick.nominal_waits + u64::from(INTERRUPT.nominal)
+}
+
+fn pessimistic(tick: &Estimate) -> u64 {
+    tick.pessimistic_cycles + tick.pessimistic_waits + u64::from(INTERRUPT.pessimistic)
+}
+
+/// Ticks a second whose shares of a processor are shown \[kHz\].
+const RATES_KHZ: [u32; 5] = [2, 10, 20, 50, 100];
+/// Clock of that processor \[kHz\].
+const CLOCK_KHZ: f64 = 168e3;
 
 pub(crate) fn estimated_cycles(tools: &Tools) -> Result<(), String> {
+    let rates = RATES_KHZ.map(|rate_khz| format!("{rate_khz} kHz"));
+    let mut columns = vec!["of a Cortex-M4F at 168 MHz, 3 axes, f32 [%]"];
+    columns.extend(rates.iter().map(String::as_str));
+    let mut shares = Table::new(&columns);
     let mut table = Table::new(&["a tick of 3 axes on a Cortex-M4F, f32", "median", "p99", "max"]);
     for kind in KINDS {
         let ticks = traced(tools, kind)?;
         for (name, of) in FIGURES {
-            let mut figures: Vec<_> = ticks.iter().map(of).collect();
-            figures.sort_unstable();
-            let last = figures.len() - 1;
-            let figures = [last / 2, last * 99 / 100, last].map(|at| figures[at].to_string());
+            let figures = spread(&ticks, of).map(|figure| figure.to_string());
             table.row(&[&[format!("{}: {name}", kind.name)], &figures[..]].concat());
+        }
+        for (side, of) in SIDES {
+            let [median, _, longest] = spread(&ticks, of);
+            for (name, cycles) in [("median", median), ("longest", longest)] {
+                let shares_of = RATES_KHZ.map(|rate_khz| share(cycles, rate_khz));
+                shares.row(&[&[format!("{}: {name} tick, {side}", kind.name)], &shares_of[..]].concat());
+            }
         }
     }
     tools.accept_compiler()?;
-    hold("cycles", &table, GROWTH)
+    hold("cycles", &table, GROWTH)?;
+    hold("shares", &shares, GROWTH)
+}
+
+/// Median, 99th percentile and most of a figure.
+fn spread(ticks: &[Estimate], of: fn(&Estimate) -> u64) -> [u64; 3] {
+    let mut figures: Vec<_> = ticks.iter().map(of).collect();
+    figures.sort_unstable();
+    let last = figures.len() - 1;
+    [last / 2, last * 99 / 100, last].map(|at| figures[at])
+}
+
+/// The part of a processor that ticks of so many cycles take, so many times a millisecond \[%\].
+fn share(cycles: u64, rate_khz: u32) -> String {
+    let percent = 100.0 * cycles as f64 * f64::from(rate_khz) / CLOCK_KHZ;
+    if percent < 100.0 { format!("{percent:.2}") } else { "does not fit".to_owned() }
 }
 
 /// An estimate for every tick of the worst seed of a kind.
