@@ -28,6 +28,8 @@
 //! [easement](crate::toolpath::easement), or is a part of what a curve or a merged line stands for; where none fits the
 //! tolerance, a stop.
 
+mod unblended;
+
 use std::cell::OnceCell;
 use std::rc::Rc;
 
@@ -119,16 +121,16 @@ struct Timed<const N: usize> {
 }
 
 /// The junctions of a run.
-pub(super) struct Junctions<'a, const N: usize> {
-    pub(super) run: Run<N>,
-    pub(super) shapes: &'a Shapes<N>,
+struct Junctions<'a, const N: usize> {
+    run: Run<N>,
+    shapes: &'a Shapes<N>,
     /// The ceilings of the moves.
-    pub(super) ceilings: Vec<Ceilings>,
+    ceilings: Vec<Ceilings>,
     /// Which junctions are kinks that might be passed under G61, but are to be smooth.
-    pub(super) are_eased: Vec<bool>,
+    are_eased: Vec<bool>,
     /// Each junction without a blend, once it was asked for.
-    pub(super) exact: Vec<OnceCell<Crossing<N>>>,
-    pub(super) machine: &'a Machine<N>,
+    exact: Vec<OnceCell<Crossing<N>>>,
+    machine: &'a Machine<N>,
 }
 
 impl<'a, const N: usize> Junctions<'a, N> {
@@ -283,7 +285,7 @@ impl<'a, const N: usize> Junctions<'a, N> {
     }
 
     /// The same, at most half of either move.
-    pub(super) fn halves_mm(&self, junction: usize, trims_mm: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
+    fn halves_mm(&self, junction: usize, trims_mm: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
         self.run.halves_mm(junction, self.other_trims_mm(junction, trims_mm))
     }
 
@@ -338,12 +340,7 @@ impl<'a, const N: usize> Junctions<'a, N> {
     }
 
     /// What is put in the place of a junction, driven at a share.
-    pub(super) fn driven(
-        &self,
-        junction: usize,
-        bent: &Rc<MeasuredCurve<N>>,
-        share: f64,
-    ) -> AtLine<Driven<N>> {
+    fn driven(&self, junction: usize, bent: &Rc<MeasuredCurve<N>>, share: f64) -> AtLine<Driven<N>> {
         let [before, after] = [junction, junction + 1].map(|index| &self.run.moves()[index]);
         let feed_mm_s = before.feeds.least(after.feeds).along(&bent.ratios);
         let ceilings = ceilings(feed_mm_s, &bent.greatest, &bent.ratios, share, self.machine)

@@ -2,7 +2,8 @@
 //!
 //! Consumes the moves of a run with their ceilings, how the other junctions are crossed, and the crossings to choose from; tells
 //! the best, and when those that are left are not expected to be better. Background: plans of at most ten blocks, one for each
-//! crossing, and all once more where a crossing lowers the feeds at the ends of all, which two pairs of plans may do.
+//! crossing. They are made when times are asked for, and once more if a crossing that is added later lowers the feeds at the ends
+//! of all, which two pairs of plans may do.
 
 use motion_kernel::law::Ramp;
 use motion_kernel::plan::{Block, BlockPlan, Ceiling, Node, PlanError, nodes_for, plan, plan_spanning};
@@ -38,7 +39,7 @@ pub(super) struct Compared<'a, const N: usize> {
     /// Feeds at both ends of the neighbourhood, with which all crossings can be planned \[mm/s\].
     feeds_mm_s: [f64; 2],
     crossings: Vec<(Crossing<N>, Window)>,
-    /// The plans of the first crossings, in their order; of all, once they were asked for.
+    /// The plans of the first crossings, in their order; `plan_all` makes those that are missing.
     plans: Vec<Planned>,
     /// Where those of one size end.
     ends: Vec<usize>,
@@ -76,7 +77,7 @@ impl<'a, const N: usize> Compared<'a, N> {
         Self { run, ceilings, junction, chosen, feeds_mm_s, crossings, plans, ends }
     }
 
-    /// Adds one more.
+    /// Adds a crossing; it is planned when a time is asked for.
     pub(super) fn add(&mut self, crossing: Crossing<N>) {
         let window = self.window(&crossing);
         self.crossings.push((crossing, window));
@@ -87,17 +88,16 @@ impl<'a, const N: usize> Compared<'a, N> {
         }
     }
 
-    /// The plans of all, of which those that are there are not made anew.
-    fn plans(&mut self) -> &[Planned] {
+    /// Makes the plans that are missing.
+    fn plan_all(&mut self) {
         let new = self.crossings[self.plans.len()..].iter();
         self.plans.extend(new.map(|(_, window)| window.planned(self.feeds_mm_s)));
-        &self.plans
     }
 
     /// Whether the last is a blend that is no better than those before, though it is driven at its ceiling all along.
     pub(super) fn is_level_in_vain(&mut self) -> bool {
-        let Some((&last, before)) = self.plans().split_last() else { return false };
-        let before = before.len();
+        self.plan_all();
+        let Some((last, before)) = self.plans.split_last() else { return false };
         last.is_level && last.time_s >= self.best_s(before)
     }
 
@@ -122,12 +122,12 @@ impl<'a, const N: usize> Compared<'a, N> {
         [0.0; 2]
     }
 
-    /// The least time of the first so many, in which a way without a blend counts for what it has to gain \[s\].
-    fn best_s(&self, count: usize) -> f64 {
+    /// The least time of the first crossings, whose plans these are; one without a blend counts for what it has to gain \[s\].
+    fn best_s(&self, plans: &[Planned]) -> f64 {
         let time_s = |((crossing, _), plan): (&(Crossing<N>, Window), &Planned)| {
             if crossing.blend().is_some() { plan.time_s } else { plan.time_s / (1.0 - EXACT_GAIN_MIN) }
         };
-        self.crossings.iter().zip(&self.plans).take(count).map(time_s).fold(f64::INFINITY, f64::min)
+        self.crossings.iter().zip(plans).map(time_s).fold(f64::INFINITY, f64::min)
     }
 
     /// Those that were added since this was said before are of one size; the first have no blend.
@@ -139,18 +139,17 @@ impl<'a, const N: usize> Compared<'a, N> {
     /// last did. Ever shorter ones are added.
     pub(super) fn is_beyond(&mut self, left: usize) -> bool {
         let [.., start, before, last] = self.ends[..] else { return false };
-        let plans = self.plans();
-        let (before, last) = (&plans[start..before], &plans[before..last]);
+        self.plan_all();
+        let (before, last) = (&self.plans[start..before], &self.plans[before..last]);
         let is_known = before.iter().chain(last).all(|plan| plan.time_s.is_finite());
-        let (before_s, last_s) = (least_s(before), least_s(last));
-        let best_s = self.best_s(self.plans.len());
+        let (best_s, before_s, last_s) = (self.best_s(&self.plans), least_s(before), least_s(last));
         let gain_s = (before_s - last_s).max(0.0);
         is_known && last_s - left as f64 * gain_s > CLEAR * best_s
     }
 
     /// The best: a blend, unless another way gains [`EXACT_GAIN_MIN`]; the one that is chosen if none has a plan.
     pub(super) fn best(mut self) -> Crossing<N> {
-        self.plans();
+        self.plan_all();
         let mut best = (&self.chosen[self.junction], f64::INFINITY);
         for has_blend in [true, false] {
             let gain = if has_blend { 0.0 } else { EXACT_GAIN_MIN };
@@ -255,6 +254,7 @@ fn lowered(blocks: &[Block<f64>], mut feeds: [f64; 2]) -> [f64; 2] {
 impl<const N: usize> Compared<'_, N> {
     /// The times of those that were added, in their order \[s\].
     pub(super) fn times_s(&mut self) -> Vec<f64> {
-        self.plans().iter().map(|plan| plan.time_s).collect()
+        self.plan_all();
+        self.plans.iter().map(|plan| plan.time_s).collect()
     }
 }

@@ -12,8 +12,7 @@
 //! - `runs`: steps to runs of moves: where motion must stop, and where long runs are cut;
 //! - `sections`: several runs smoothed at once;
 //! - `blending`: stretches to blocks: the choice of the junctions that are blended, `crossing`: how one is crossed,
-//!   `shapes`: its blends and easements, each made once, `kinks`: what it is without a blend, and `compared`: the best of its
-//!   crossings;
+//!   `shapes`: its blends and easements, each made once, and `compared`: the best of its crossings;
 //! - [`outputs`]: spindle and coolant: what the machine switches;
 //! - `ceilings`: the ceiling of a move or a blend, and of a junction;
 //! - `curves`: programmed curves to moves;
@@ -41,7 +40,6 @@ mod crossing;
 mod curves;
 mod density;
 mod items;
-mod kinks;
 mod pipeline;
 mod runs;
 mod sections;

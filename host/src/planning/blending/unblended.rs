@@ -7,15 +7,15 @@ use std::rc::Rc;
 
 use motion_kernel::plan::Ceiling;
 
-use super::blending::Junctions;
-use super::ceilings::{Ceilings, ceilings, junction_feed};
-use super::compared::Compared;
-use super::crossing::{By, Crossing, Eased};
-use super::error::AtLine;
-use super::shapes::{MeasuredCurve, MeasuredEasement};
+use super::Junctions;
+use crate::planning::ceilings::{Ceilings, ceilings, junction_feed};
+use crate::planning::compared::Compared;
+use crate::planning::crossing::{By, Crossing, Eased};
+use crate::planning::error::AtLine;
+use crate::planning::shapes::{MeasuredCurve, MeasuredEasement};
 
 /// Lengths of easements that are tried, as parts of what there is room for.
-const SIZES: [f64; 2] = [1.0, 0.25];
+const EASEMENT_SIZES: [f64; 2] = [1.0, 0.25];
 
 impl<const N: usize> Junctions<'_, N> {
     /// A junction without a blend; a kink that might be passed, but for the step of velocity, with the fastest of its easements
@@ -109,7 +109,7 @@ impl<const N: usize> Junctions<'_, N> {
         }
         let rooms_mm = self.halves_mm(junction, |junction| chosen[junction].trims_mm());
         let mut are_any = false;
-        for size in SIZES {
+        for size in EASEMENT_SIZES {
             for eased in self.eased(junction, rooms_mm.map(|room_mm| size * room_mm))? {
                 compared.add(eased);
                 are_any = true;
