@@ -41,7 +41,7 @@ pub(crate) fn by_name(printed: &str) -> BTreeMap<String, Vec<u32>> {
 }
 
 /// Least, median, 99th percentile, greatest.
-fn distribution(sorted: &[u32]) -> [u32; 4] {
+pub(crate) fn distribution<T: Copy>(sorted: &[T]) -> [T; 4] {
     let last = sorted.len() - 1;
     [sorted[0], sorted[last / 2], sorted[last * 99 / 100], sorted[last]]
 }

@@ -15,7 +15,7 @@ use motion_tests::cycles::{Begin, Calls, Estimate, INTERRUPT};
 use motion_tests::figures::{Table, hold};
 use object::{Object, ObjectSymbol, SymbolKind};
 
-use crate::budget::GROWTH;
+use crate::budget::{GROWTH, distribution};
 use crate::search::{KINDS, Kind};
 use crate::tools::{Bundle, COUNTING, M4F, Tools};
 
@@ -55,12 +55,17 @@ pub(crate) fn estimated_cycles(tools: &Tools) -> Result<(), String> {
     let mut table = Table::new(&["a tick of 3 axes on a Cortex-M4F, f32", "median", "p99", "max"]);
     for kind in KINDS {
         let ticks = traced(tools, kind)?;
+        let of_all = |of: fn(&Estimate) -> u64| {
+            let mut figures: Vec<_> = ticks.iter().map(of).collect();
+            figures.sort_unstable();
+            distribution(&figures)
+        };
         for (name, of) in FIGURES {
-            let figures = spread(&ticks, of).map(|figure| figure.to_string());
+            let [_, figures @ ..] = of_all(of).map(|figure| figure.to_string());
             table.row(&[&[format!("{}: {name}", kind.name)], &figures[..]].concat());
         }
         for (side, of) in SIDES {
-            let [median, _, longest] = spread(&ticks, of);
+            let [_, median, _, longest] = of_all(of);
             for (name, cycles) in [("median", median), ("longest", longest)] {
                 let shares_of = RATES_KHZ.map(|rate_khz| share(cycles, rate_khz));
                 shares.row(&[&[format!("{}: {name} tick, {side}", kind.name)], &shares_of[..]].concat());
@@ -70,14 +75,6 @@ pub(crate) fn estimated_cycles(tools: &Tools) -> Result<(), String> {
     tools.accept_compiler()?;
     hold("cycles", &table, GROWTH)?;
     hold("shares", &shares, GROWTH)
-}
-
-/// Median, 99th percentile and most of a figure.
-fn spread(ticks: &[Estimate], of: fn(&Estimate) -> u64) -> [u64; 3] {
-    let mut figures: Vec<_> = ticks.iter().map(of).collect();
-    figures.sort_unstable();
-    let last = figures.len() - 1;
-    [last / 2, last * 99 / 100, last].map(|at| figures[at])
 }
 
 /// The part of a processor that ticks of so many cycles take, so many times a millisecond \[%\].

@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 
 use motion_tests::figures::{Table, hold};
 
-use crate::budget::GROWTH;
+use crate::budget::{GROWTH, distribution};
 use crate::tools::{HANGS_AFTER_S, Tools};
 
 /// The emulator's time for an instruction is 2 to this power \[ns\].
@@ -182,9 +182,11 @@ pub(crate) fn instructions<'a>(
     let cycles = lines.filter_map(|line| line.strip_prefix("interrupt ")?.parse::<f64>().ok());
     let mut counted: Vec<u32> =
         cycles.map(|cycles| (cycles / cycles_per_instruction).round() as u32).collect();
+    if counted.is_empty() {
+        return Err("no interrupt was counted".to_owned());
+    }
     counted.sort_unstable();
-    let last = counted.len().checked_sub(1).ok_or("no interrupt was counted")?;
-    Ok([counted[0], counted[last / 2], counted[last * 99 / 100], counted[last]])
+    Ok(distribution(&counted))
 }
 
 pub(crate) fn instructions_of_the_interrupt(tools: &Tools) -> Result<(), String> {

@@ -118,3 +118,57 @@ impl<const N: usize> Junctions<'_, N> {
         Ok(are_any)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use motion_tests::random::Random;
+
+    use super::*;
+    use crate::machine::Machine;
+    use crate::planning::ceilings::in_any_direction;
+    use crate::planning::shapes::Shapes;
+    use crate::toolpath::smooth::Run;
+    use crate::toolpath::smooth::tests::path;
+
+    /// An easement that lowers the feeds at the ends of a comparison lowers them for those before it, whenever these were planned.
+    #[test]
+    fn all_easements_are_compared_at_the_same_feeds() {
+        let machine = Machine::reference();
+        let mut random = Random::of_stream(73);
+        let mut lowered = 0;
+        for _ in 0..200 {
+            let (mut at, mut heading_rad, mut points) = ([0.0, 0.0], 0.0_f64, vec![[0.0, 0.0]]);
+            for _ in 0..8 {
+                let length_mm = random.log(0.05, 5.0);
+                let (sine, cosine) = libm::sincos(heading_rad);
+                at = [at[0] + length_mm * cosine, at[1] + length_mm * sine];
+                points.push(at);
+                heading_rad += random.sign() * random.log(1e-4, 8e-3);
+            }
+            let feeds_mm_s: Vec<f64> = points.iter().map(|_| random.log(3.0, 100.0)).collect();
+            let moves = path(&points, random.log(2e-3, 0.2), |line| feeds_mm_s[line as usize]);
+            let shapes = Shapes::new(in_any_direction(&moves, &machine), machine.letters_by_place());
+            let junctions = Junctions::new(Run::exact(&moves), &shapes, &machine).expect("limits");
+            let count = junctions.run.junctions();
+            let chosen: Vec<_> =
+                (0..count).map(|junction| junctions.exact_at(junction).expect("limits")).collect();
+            for junction in 0..count {
+                let new = || Compared::new(&junctions.run, &junctions.ceilings, junction, &chosen);
+                let (mut asked_each_time, mut asked_once) = (new(), new());
+                let mut first_s = None;
+                for size in EASEMENT_SIZES {
+                    let rooms_mm = junctions.halves_mm(junction, |_| [0.0; 2]).map(|room_mm| size * room_mm);
+                    for eased in junctions.eased(junction, rooms_mm).expect("limits") {
+                        asked_each_time.add(eased.clone());
+                        first_s.get_or_insert(asked_each_time.times_s()[0]);
+                        asked_once.add(eased);
+                    }
+                }
+                let times_s = asked_each_time.times_s();
+                assert_eq!(times_s, asked_once.times_s());
+                lowered += u32::from(first_s != times_s.first().copied());
+            }
+        }
+        assert!(lowered > 20, "{lowered}");
+    }
+}
