@@ -206,7 +206,7 @@ impl<R: Root> Law<R> {
         }
         let by_jerk_s = self.by_jerk_s(change_mm_s);
         let (rise_s, limited_by) = if by_jerk_s <= self.snap_time_s {
-            (change_mm_s.cbrt() / self.snap_root(), LimitedBy::Snap)
+            (change_mm_s.cbrt_quotient(self.limits.snap_mm_s4 / R::from_f64(TAU)), LimitedBy::Snap)
         } else if by_jerk_s < self.accel_time_s {
             (by_jerk_s, LimitedBy::Jerk)
         } else {

@@ -250,6 +250,10 @@ impl Root for Fixed {
         Self::from_bits(if self.to_bits() < 0 { -root } else { root })
     }
 
+    fn cbrt_quotient(self, per: Self) -> Self {
+        self.cbrt() / per.cbrt()
+    }
+
     fn times_per(self, by: Self, per: Self) -> Self {
         let (product, per) =
             (i128::from(self.to_bits()) * i128::from(by.to_bits()), i128::from(per.to_bits()));

@@ -1,11 +1,12 @@
 //! The two float types.
 //!
-//! Roots come from `libm`: its square and cube roots are correctly rounded, and pure Rust.
+//! Square roots come from `libm`: correctly rounded, and pure Rust.
 
+use super::cube_root::{cbrt, cbrtf};
 use super::{Real, Root, Scalar, Unit};
 
 macro_rules! float {
-    ($float:ident, $sqrt:path, $cbrt:path, terms: $terms:literal, piece_mm: $piece:literal, ramp_mm: $ramp:literal, q32: $from_q32:path, $q32:path, fraction: |$f:ident| $fraction:expr) => {
+    ($float:ident, $sqrt:path, $cbrt:ident, terms: $terms:literal, piece_mm: $piece:literal, ramp_mm: $ramp:literal, q32: $from_q32:path, $q32:path, fraction: |$f:ident| $fraction:expr) => {
         impl Scalar for $float {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
@@ -100,6 +101,11 @@ macro_rules! float {
             }
 
             #[inline]
+            fn cbrt_quotient(self, per: Self) -> Self {
+                $cbrt(self / per)
+            }
+
+            #[inline]
             fn times_per(self, by: Self, per: Self) -> Self {
                 self * by / per
             }
@@ -123,9 +129,9 @@ macro_rules! float {
 }
 
 // f32 keeps the top word only: one conversion instruction on a core with a single-precision FPU.
-float!(f32, libm::sqrtf, libm::cbrtf, terms: 7, piece_mm: 16.0, ramp_mm: 16.0e3, q32: f32_from_q32, f32_to_q32,
+float!(f32, libm::sqrtf, cbrtf, terms: 7, piece_mm: 16.0, ramp_mm: 16.0e3, q32: f32_from_q32, f32_to_q32,
     fraction: |fraction| (fraction >> 32) as u32 as Self * (1.0 / 4_294_967_296.0));
-float!(f64, libm::sqrt, libm::cbrt, terms: 12, piece_mm: 1.0e6, ramp_mm: 1.0e9, q32: f64_from_q32, f64_to_q32,
+float!(f64, libm::sqrt, cbrt, terms: 12, piece_mm: 1.0e6, ramp_mm: 1.0e9, q32: f64_from_q32, f64_to_q32,
     fraction: |fraction| (fraction >> 11) as Self * (1.0 / 9_007_199_254_740_992.0));
 
 /// Whether `x` is a number, and not infinite. By its bits: the library's becomes a hundred bytes wherever it

@@ -31,6 +31,7 @@
 //! assert!((stop_mm::<Fixed>(50.0, 0.001) - 2.5).abs() < 1e-6);
 //! ```
 
+mod cube_root;
 mod fixed_point;
 mod float;
 mod series;
@@ -171,6 +172,9 @@ pub trait Root: Real + Div<Output = Self> {
     /// Cube root.
     #[must_use]
     fn cbrt(self) -> Self;
+    /// (self/per)^⅓ for `per` > 0. Fixed point divides the roots: the quotient may be too small for it.
+    #[must_use]
+    fn cbrt_quotient(self, per: Self) -> Self;
     /// self·by/per. Fixed point rounds the result alone, to the nearest, and saturates.
     #[must_use]
     fn times_per(self, by: Self, per: Self) -> Self;
