@@ -24,6 +24,7 @@
 
 use motion_kernel::internals::add_work;
 use motion_kernel::law::Limits;
+use motion_kernel::num::Root;
 
 use super::curve::{Curve, Spiral, by_arc_length};
 use super::element::{Element, Role};
@@ -161,7 +162,7 @@ pub(crate) fn derivatives<const N: usize>(curve: &Polynomial<N>) -> [f64; 3] {
 /// \[1/mm, 1/mm², 1/mm³\].
 pub(crate) fn feed_within(limits: &Limits<f64>, [second, third, fourth]: [f64; 3]) -> f64 {
     let by_accel = (limits.accel_mm_s2 / second).sqrt();
-    let by_jerk = libm::cbrt(limits.jerk_mm_s3 / third);
+    let by_jerk = Root::cbrt(limits.jerk_mm_s3 / third);
     let by_snap = (limits.snap_mm_s4 / fourth).sqrt().sqrt();
     // Not `min`, which would overlook what is not a number.
     [by_jerk, by_snap].into_iter().fold(by_accel, |least, feed| if feed >= least { least } else { feed })

@@ -5,6 +5,7 @@
 //! greater than the curve's on corner blends, the fourth up to two thirds. So both are examined, the curve
 //! and its pieces.
 
+use motion_kernel::num::Root;
 use motion_kernel::plan::Bend;
 use wide::f64x4;
 
@@ -69,7 +70,7 @@ fn of_piece<const N: usize>(piece: &Septic<N>) -> [f64; 3] {
 
 /// The bend of which |r''|, |r'''| and |r''''| are `norms` at their greatest.
 pub(super) fn bend([second, third, fourth]: [f64; 3]) -> Bend<f64> {
-    Bend { curvature_per_mm: second, third_root_per_mm: third.sqrt(), fourth_root_per_mm: libm::cbrt(fourth) }
+    Bend { curvature_per_mm: second, third_root_per_mm: third.sqrt(), fourth_root_per_mm: Root::cbrt(fourth) }
 }
 
 /// The greatest value of a sampled function, between its samples too: between two of them a smooth function

@@ -14,6 +14,7 @@
 //! d from an involute lies the same involute, rotated by −d/r and traversed at angles that are greater by d/r
 //! ([`Involute::offset_by`]), so that a cutter's radius needs nothing new.
 
+use motion_kernel::num::Root;
 use motion_kernel::plan::Bend;
 
 use super::curve::{Curve, in_plane};
@@ -133,7 +134,7 @@ impl<const N: usize> Involute<N> {
         let bend = Bend {
             curvature_per_mm: curvature,
             third_root_per_mm: curvature * (1.0 + steep).sqrt().sqrt(),
-            fourth_root_per_mm: curvature * libm::cbrt((1.0 + 3.0 * steep + 9.0 * steep * steep).sqrt()),
+            fourth_root_per_mm: curvature * Root::cbrt((1.0 + 3.0 * steep + 9.0 * steep * steep).sqrt()),
         };
         // Of all directions in the plane: conservative where it turns through a part of them only.
         let tangent = self.in_plane();

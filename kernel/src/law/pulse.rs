@@ -39,7 +39,7 @@ impl<R: Root> JerkPulse<R> {
     /// x = Jp·P·(P − e) \[s\].
     pub(super) fn duration_for_s(jerk_mm_s3: R, edge_s: R, change_mm_s: R) -> R {
         let middle_s = R::from_f64(0.5) * edge_s;
-        middle_s + middle_s.root_of_squares(change_mm_s.sqrt() / jerk_mm_s3.sqrt())
+        middle_s + middle_s.root_of_square_and_quotient(change_mm_s, jerk_mm_s3)
     }
 
     /// The length of the arch that the two edges make \[s\].

@@ -138,13 +138,13 @@ impl<U: Unit> Shape<U> {
     /// [`ABOUT_MISSING_WITHIN`].
     ///
     /// With S(x) the feed that an edge gains, `missing` = `accel`·x − S(x): two Newton steps, the first with a rough S.
-    pub(super) fn about_where_missing_is(missing: f64, accel: f64) -> (f64, f64) {
-        let series = |coefficients: &[f64; 5], square: f64| {
-            coefficients.iter().rev().fold(0.0, |sum, &coefficient| sum * square + coefficient)
+    pub(super) fn about_where_missing_is<R: Root<Unit = U>>(missing: R, accel: R) -> (R, R) {
+        let series = |coefficients: &[f64; 5], square: R| {
+            coefficients.iter().rev().fold(R::ZERO, |sum, &each| sum * square + R::from_f64(each))
         };
         let alone = missing / accel;
-        let rough = EDGE_SPEED_MEAN * alone * alone * alone;
-        let x = alone + rough * alone / (accel - 4.0 * rough);
+        let rough = R::from_f64(EDGE_SPEED_MEAN) * alone * alone * alone;
+        let x = alone + rough * alone / (accel - R::from_f64(4.0) * rough);
         let (square, cube) = (x * x, x * x * x);
         let (speed, slope) = (cube * x * series(&EDGE_SPEED, square), cube * series(&EDGE_ACCEL, square));
         let x = x + (missing - accel * x + speed) / (accel - slope);

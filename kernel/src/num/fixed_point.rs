@@ -274,6 +274,10 @@ impl Root for Fixed {
         Self::from_bits(integer_root::<2>(square(self) + square(other)))
     }
 
+    fn root_of_square_and_quotient(self, of: Self, per: Self) -> Self {
+        self.root_of_squares(of.sqrt() / per.sqrt())
+    }
+
     fn spacing(self) -> Self {
         Self::from_bits(1)
     }

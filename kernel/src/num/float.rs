@@ -121,6 +121,11 @@ macro_rules! float {
             }
 
             #[inline]
+            fn root_of_square_and_quotient(self, of: Self, per: Self) -> Self {
+                $sqrt(self * self + of / per)
+            }
+
+            #[inline]
             fn spacing(self) -> Self {
                 self.abs() * $float::EPSILON
             }

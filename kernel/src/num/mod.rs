@@ -184,6 +184,9 @@ pub trait Root: Real + Div<Output = Self> {
     /// √(self² + other²). Fixed point rounds the result alone, down, and saturates.
     #[must_use]
     fn root_of_squares(self, other: Self) -> Self;
+    /// √(self² + of/per); `of` ≥ 0, `per` > 0. Fixed point divides the roots: the quotient may be too small for it.
+    #[must_use]
+    fn root_of_square_and_quotient(self, of: Self, per: Self) -> Self;
     /// The distance of neighbouring values around this one, to a factor of two.
     #[must_use]
     fn spacing(self) -> Self;

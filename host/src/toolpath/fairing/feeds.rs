@@ -1,6 +1,7 @@
 //! The feeds along a curve: what it allows at its tightest, with the ramps between.
 
 use motion_kernel::law::Limits;
+use motion_kernel::num::Root;
 
 /// Part of the acceleration and the jerk that ramps may take where bends take the rest, and where a span is
 /// driven so much slower than it allows that its bends take 0.44 of acceleration and 0.3 of jerk: across to
@@ -79,7 +80,7 @@ fn rise_within_mm_s(from_mm_s: f64, length_mm: f64, limits: &Limits<f64>) -> f64
         return rise;
     }
     // (v + r/2)·2t = length with r = j·t² otherwise. Newton from above, where the slope is greater.
-    let mut time_s = libm::cbrt(length_mm / jerk);
+    let mut time_s = Root::cbrt(length_mm / jerk);
     if from_mm_s > 0.0 {
         time_s = time_s.min(length_mm / (2.0 * from_mm_s));
     }

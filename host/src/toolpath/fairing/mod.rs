@@ -31,6 +31,7 @@ mod knots;
 mod problem;
 
 use motion_kernel::law::Limits;
+use motion_kernel::num::Root;
 
 use self::deviation::Walk;
 use self::guide::Guide;
@@ -370,7 +371,7 @@ fn programmed_mm_s<const N: usize>(guide: &Guide<N>, mesh: &Mesh) -> Vec<f64> {
 fn promised_mm_s<const N: usize>(guide: &Guide<N>, mesh: &Mesh, limits: &Limits<f64>) -> Vec<f64> {
     let of_span = |(ends, scale_mm): (&[f64], &f64)| {
         let tolerance_mm = guide.parts[guide.part_at(ends[0])].tolerance_mm;
-        scale_mm * libm::cbrt(limits.jerk_mm_s3 / (THIRD * tolerance_mm))
+        scale_mm * Root::cbrt(limits.jerk_mm_s3 / (THIRD * tolerance_mm))
     };
     mesh.breaks_mm.windows(2).zip(&mesh.scales_mm).map(of_span).collect()
 }
