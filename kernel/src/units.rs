@@ -18,6 +18,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use crate::num::Real;
 
 const STEPS_PER_MM: f64 = 4_294_967_296.0;
+/// What it adds to a float's exponent, in place: products and comparisons of f64 are software on most targets.
+const STEPS_EXPONENT: u64 = 32 << (f64::MANTISSA_DIGITS - 1);
 
 /// A position or a length in mm, in steps of 2⁻³² mm (0.23 pm), from −2³¹ to 2³¹ mm.
 ///
@@ -59,14 +61,17 @@ impl Position {
     #[must_use]
     #[inline(never)]
     pub fn from_mm(mm: f64) -> Option<Self> {
-        if !(libm::fabs(mm) <= Self::LIMIT_MM) {
+        let magnitude = mm.to_bits() << 1 >> 1;
+        // As floats are ordered, so are the bits of positive ones; what is no number is above all.
+        if magnitude > Self::LIMIT_MM.to_bits() {
             return None;
         }
         // Below 2⁵² steps. With 2⁵² on top the float's last place is a step: the sum is rounded to it, halves
         // to even, and its lower bits are the number of steps.
         const STEP_IS_LAST: f64 = 4_503_599_627_370_496.0;
-        let steps = (libm::fabs(mm) * STEPS_PER_MM + STEP_IS_LAST).to_bits() - STEP_IS_LAST.to_bits();
-        let steps = steps.cast_signed();
+        // 0 becomes a number that is lost in the sum.
+        let steps = f64::from_bits(magnitude + STEPS_EXPONENT) + STEP_IS_LAST;
+        let steps = (steps.to_bits() - STEP_IS_LAST.to_bits()).cast_signed();
         Some(Self::from_bits(if mm.is_sign_negative() { -steps } else { steps }))
     }
 
@@ -74,10 +79,9 @@ impl Position {
     #[must_use]
     #[inline(never)]
     pub fn to_mm(self) -> f64 {
-        // Halves are exact in f64, and their sum is rounded once.
-        let bits = self.to_bits();
-        let (upper, lower) = ((bits >> 32) as i32, bits as u32);
-        f64::from(upper) + f64::from(lower) / STEPS_PER_MM
+        // Rounded once to a float, whose exponent is that of steps.
+        let steps = (self.to_bits() as f64).to_bits();
+        f64::from_bits(if steps == 0 { 0 } else { steps - STEPS_EXPONENT })
     }
 
     /// Whether it is within ±[`Self::LIMIT_MM`].

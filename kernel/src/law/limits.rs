@@ -170,7 +170,7 @@ impl<R: Root> Law<R> {
         let accel_time_s = match pulse {
             Pulse::Sin2 => two.times_per(accel, peak),
             // No shorter than two edges, which it is by rounding where the plateau is empty.
-            Pulse::Plateau => (accel / peak + snap_time_s / two).max(snap_time_s),
+            Pulse::Plateau => (accel / peak + snap_time_s.half()).max(snap_time_s),
         };
         Self { pulse, limits, jerk_mm_s3: peak, snap_time_s, accel_time_s }
     }
@@ -199,7 +199,6 @@ impl<R: Root> Law<R> {
     /// feed of only a few steps.
     pub(super) fn times(&self, change_mm_s: R) -> Times<R> {
         work::add(1);
-        let half = R::from_f64(0.5);
         if change_mm_s <= R::ZERO {
             let (edge_s, rise_s, fall_start_s) = (R::ZERO, R::ZERO, R::ZERO);
             return Times { edge_s, rise_s, fall_start_s, limited_by: LimitedBy::Snap };
@@ -212,15 +211,15 @@ impl<R: Root> Law<R> {
         } else {
             (self.accel_time_s, LimitedBy::Acceleration)
         };
-        let rise_s = rise_s + R::MARGIN;
+        let rise_s = rise_s.rounded_up();
         let (edge_s, rise_s) = match (self.pulse, limited_by) {
             (Pulse::Sin2, _) | (Pulse::Plateau, LimitedBy::Snap) => {
-                (half * rise_s, half * rise_s + half * rise_s)
+                (rise_s.half(), rise_s.half() + rise_s.half())
             }
-            (Pulse::Plateau, _) => ((half * (self.snap_time_s + R::MARGIN)).min(half * rise_s), rise_s),
+            (Pulse::Plateau, _) => (self.snap_time_s.rounded_up().half().min(rise_s.half()), rise_s),
         };
         let fall_start_s = match limited_by {
-            LimitedBy::Acceleration => (change_mm_s / self.limits.accel_mm_s2 + R::MARGIN).max(rise_s),
+            LimitedBy::Acceleration => (change_mm_s / self.limits.accel_mm_s2).rounded_up().max(rise_s),
             LimitedBy::Jerk | LimitedBy::Snap => rise_s,
         };
         Times { edge_s, rise_s, fall_start_s, limited_by }
@@ -231,7 +230,7 @@ impl<R: Root> Law<R> {
         match self.pulse {
             Pulse::Sin2 => change_mm_s.sqrt() / self.jerk_root(),
             Pulse::Plateau => {
-                JerkPulse::duration_for_s(self.jerk_mm_s3, R::from_f64(0.5) * self.snap_time_s, change_mm_s)
+                JerkPulse::duration_for_s(self.jerk_mm_s3, self.snap_time_s.half(), change_mm_s)
             }
         }
     }
@@ -240,12 +239,12 @@ impl<R: Root> Law<R> {
     /// J'·P·(P − e') \[mm/s\]. Saturates in fixed point.
     pub(super) fn change_mm_s(&self, rise_s: R) -> R {
         // The first product is at most A.
-        ((rise_s - R::from_f64(0.5) * self.snap_time_s) * self.jerk_mm_s3).times_per(rise_s, R::ONE)
+        ((rise_s - self.snap_time_s.half()) * self.jerk_mm_s3).times_per(rise_s, R::ONE)
     }
 
     /// √(J'/2): P = √x/√(J'/2) where jerk fixes the sin² pulse.
     pub(super) fn jerk_root(&self) -> R {
-        (R::from_f64(0.5) * self.jerk_mm_s3).sqrt()
+        self.jerk_mm_s3.half().sqrt()
     }
 
     /// (DJ/2π)^⅓: P = x^⅓/(DJ/2π)^⅓ where snap fixes the ramp.
@@ -267,6 +266,6 @@ impl<R: Root> Law<R> {
     /// point.
     pub fn ramp_length_mm(&self, from_mm_s: R, to_mm_s: R) -> R {
         let time_s = self.ramp_time_s((to_mm_s - from_mm_s).abs());
-        (from_mm_s + to_mm_s).times_per(time_s, R::from_f64(2.0))
+        (from_mm_s + to_mm_s).half_product(time_s)
     }
 }

@@ -38,7 +38,7 @@ impl<R: Root> JerkPulse<R> {
     /// The length of a pulse with this peak jerk > 0 and these edges, of which two make a change of feed: P of
     /// x = Jp·P·(P − e) \[s\].
     pub(super) fn duration_for_s(jerk_mm_s3: R, edge_s: R, change_mm_s: R) -> R {
-        let middle_s = R::from_f64(0.5) * edge_s;
+        let middle_s = edge_s.half();
         middle_s + middle_s.root_of_square_and_quotient(change_mm_s, jerk_mm_s3)
     }
 
@@ -64,19 +64,19 @@ impl<R: Root> JerkPulse<R> {
 
     /// The feed gained by its end: (8).
     pub(super) fn speed_mm_s(&self) -> R {
-        self.accel_mm_s2() * (R::from_f64(0.5) * self.duration_s)
+        self.accel_mm_s2() * self.duration_s.half()
     }
 
     /// The length gained by its end: (9).
     pub(super) fn length_mm(&self) -> R {
         // Half of the acceleration times the second moment of the jerk about the end: of a box of length P −
         // e widened by an edge, around the middle.
-        let half_s = R::from_f64(0.5) * self.duration_s;
+        let half_s = self.duration_s.half();
         let wide_s = self.duration_s - self.edge_s;
         let moment = half_s * half_s
             + wide_s * wide_s * R::from_f64(1.0 / 12.0)
             + self.edge_s * self.edge_s * R::from_f64(0.25 - 2.0 / (PI * PI));
-        R::from_f64(0.5) * self.accel_mm_s2() * moment
+        self.accel_mm_s2().half() * moment
     }
 
     /// The feed gained in its closing edge: what acceleration gains at its peak, less what it is below that.
@@ -119,11 +119,11 @@ impl<R: Root> JerkPulse<R> {
 
     /// What is gained `after_s` after the plateau's start.
     fn plateau(&self, after_s: R) -> FeedState<R> {
-        let (half, third) = (R::from_f64(0.5), R::from_f64(1.0 / 3.0));
+        let third = R::from_f64(1.0 / 3.0);
         let edge = self.gained(&Shape::middle());
-        let bent = half * self.jerk_mm_s3 * after_s;
+        let bent = self.jerk_mm_s3.half() * after_s;
         FeedState {
-            s_mm: edge.s_mm + after_s * (edge.v_mm_s + after_s * (half * edge.a_mm_s2 + third * bent)),
+            s_mm: edge.s_mm + after_s * (edge.v_mm_s + after_s * (edge.a_mm_s2.half() + third * bent)),
             v_mm_s: edge.v_mm_s + after_s * (edge.a_mm_s2 + bent),
             a_mm_s2: edge.a_mm_s2 + self.jerk_mm_s3 * after_s,
             j_mm_s3: self.jerk_mm_s3,
@@ -135,9 +135,8 @@ impl<R: Root> JerkPulse<R> {
     fn closing(&self, left_s: R) -> FeedState<R> {
         let accel = self.accel_mm_s2();
         let edge = self.opening(left_s);
-        let half = R::from_f64(0.5);
         FeedState {
-            s_mm: self.length_mm() - left_s * (self.speed_mm_s() - half * accel * left_s) - edge.s_mm,
+            s_mm: self.length_mm() - left_s * (self.speed_mm_s() - accel.half() * left_s) - edge.s_mm,
             v_mm_s: self.speed_mm_s() - (accel * left_s - edge.v_mm_s),
             a_mm_s2: accel - edge.a_mm_s2,
             j_mm_s3: edge.j_mm_s3,
@@ -155,8 +154,7 @@ impl<R: Root> JerkPulse<R> {
             let (x, shape) = Shape::where_speed_is(speed_mm_s / speed);
             return (self.arch_s() * x, length.scaled(shape.length));
         }
-        let half = R::from_f64(0.5);
-        let plateau_mm_s = plateau_s * (edge.a_mm_s2 + half * self.jerk_mm_s3 * plateau_s);
+        let plateau_mm_s = plateau_s * (edge.a_mm_s2 + self.jerk_mm_s3.half() * plateau_s);
         let held = speed_mm_s - edge.v_mm_s;
         if held <= plateau_mm_s {
             let after_s = self.plateau_time_s(edge.a_mm_s2, held);

@@ -121,7 +121,7 @@ impl<R: Root> Ramp<R> {
 
     /// S(t_p) \[mm\]: (12).
     pub fn length_mm(&self) -> R {
-        (self.from_mm_s + self.to_mm_s).times_per(self.duration_s(), R::from_f64(2.0))
+        (self.from_mm_s + self.to_mm_s).half_product(self.duration_s())
     }
 
     /// How long a pulse holds its peak jerk \[s\]: 0 in a sin² pulse.
@@ -159,7 +159,6 @@ impl<R: Root> Ramp<R> {
     /// The time of a ramp like this one that changes the feed by `change_mm_s` > 0, and its derivative, as
     /// long as the same limit fixes it \[s, s²/mm\].
     pub(crate) fn time_for_s(&self, change_mm_s: R) -> (R, R) {
-        let (half, two) = (R::from_f64(0.5), R::from_f64(2.0));
         let jerk = self.peak_jerk_mm_s3;
         match self.limited_by {
             LimitedBy::Acceleration => {
@@ -168,11 +167,11 @@ impl<R: Root> Ramp<R> {
             }
             LimitedBy::Jerk if self.plateau_s() > R::ZERO => {
                 let rise_s = self.rise_for_s(change_mm_s);
-                (two * rise_s, R::ONE / (jerk * (rise_s - half * self.edge_s)))
+                (rise_s + rise_s, R::ONE / (jerk * (rise_s - self.edge_s.half())))
             }
             LimitedBy::Jerk => {
-                let time_s = two * (two * change_mm_s / jerk).sqrt();
-                (time_s, half * time_s / change_mm_s)
+                let rise_s = ((change_mm_s + change_mm_s) / jerk).sqrt();
+                (rise_s + rise_s, rise_s / change_mm_s)
             }
             LimitedBy::Snap => {
                 let share = change_mm_s / (self.to_mm_s - self.from_mm_s).abs();
@@ -205,10 +204,9 @@ impl<R: Root> Ramp<R> {
             self.length_mm() - (self.to_mm_s * at_s - length_mm)
         } else {
             let held_s = (gained - curved) / pulse.accel_mm_s2();
-            let half = R::from_f64(0.5);
             self.from_mm_s * self.t1_s
                 + pulse.length_mm()
-                + held_s * (self.from_mm_s + curved + half * (gained - curved))
+                + held_s * (self.from_mm_s + curved + (gained - curved).half())
         }
     }
 
@@ -254,7 +252,7 @@ impl<R: Root> Ramp<R> {
             let v_start = self.from_mm_s + pulse.speed_mm_s();
             let s_start = self.from_mm_s * self.t1_s + pulse.length_mm();
             FeedState {
-                s_mm: s_start + held_s * (v_start + R::from_f64(0.5) * accel * held_s),
+                s_mm: s_start + held_s * (v_start + accel.half() * held_s),
                 v_mm_s: v_start + accel * held_s,
                 a_mm_s2: accel,
                 j_mm_s3: R::ZERO,

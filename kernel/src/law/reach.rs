@@ -42,7 +42,7 @@ fn fit<R: Root>(feed: R, least: R, fits: impl Fn(R) -> bool) -> R {
     low = low.max(least);
     // The last step was as long as all steps before it together, and it may have gone too far: bisect it.
     for _ in 1..steps {
-        let middle = low + R::from_f64(0.5) * (high - low);
+        let middle = low + (high - low).half();
         if fits(middle) {
             low = middle;
         } else {
@@ -77,7 +77,7 @@ fn change_within<R: Root>(law: &Law<R>, lower: R, length: R) -> R {
         // (F + x/2)(x/A + P) = L, solved for x without cancellation; a = A·P/2:
         // x = (2AL − 4aF)/(√((F − a)² + 2AL) + F + a), no square taken by itself.
         let accel = law.limits().accel_mm_s2;
-        let a = R::from_f64(0.5) * x2;
+        let a = x2.half();
         let all = (accel + accel).sqrt_product(length);
         let taken = x2.sqrt_product(double_lower);
         (all - taken).times_per(all + taken, (lower - a).root_of_squares(all) + lower + a)
@@ -87,14 +87,14 @@ fn change_within<R: Root>(law: &Law<R>, lower: R, length: R) -> R {
 /// The length P of a pulse with a plateau for which a ramp without a hold from `double_lower`/2 takes
 /// `length`: P·(2F + J'·P·(P − e')) = L, of which P is longer than two edges and shorter than acceleration allows.
 fn pulse_within<R: Root>(law: &Law<R>, double_lower: R, length: R) -> R {
-    let edge_mm_s2 = R::from_f64(0.5) * law.snap_time_s * law.jerk_mm_s3;
+    let edge_mm_s2 = law.snap_time_s.half() * law.jerk_mm_s3;
     // All of these are above the root; x ≥ J'·P²/2 gives the second.
     let by_jerk_s = (length + length).cbrt() / law.jerk_mm_s3.cbrt();
     let mut pulse_s = law.accel_time_s.min(by_jerk_s);
     if double_lower > R::ZERO {
         pulse_s = pulse_s.min(length.times_per(R::ONE, double_lower));
     }
-    pulse_s = pulse_s + R::MARGIN;
+    pulse_s = pulse_s.rounded_up();
     // Increasing and convex in P: Newton falls to the root.
     for _ in 0..NEWTON_STEPS_MAX {
         let change = law.change_mm_s(pulse_s);
@@ -140,7 +140,6 @@ fn root_of_power<R: Root, const N: usize>(p: R, k: R, length: R) -> R {
 /// direct ramp it is the higher of the two feeds.
 #[must_use]
 pub fn peak<R: Root>(law: &Law<R>, from_mm_s: R, to_mm_s: R, length_mm: R) -> R {
-    let half = R::from_f64(0.5);
     let (higher, lower) = (from_mm_s.max(to_mm_s), from_mm_s.min(to_mm_s));
     let step = higher - lower;
     // Room within rounding counts as none: the peak would rise by less than that.
@@ -148,7 +147,7 @@ pub fn peak<R: Root>(law: &Law<R>, from_mm_s: R, to_mm_s: R, length_mm: R) -> R 
     if length_mm - law.ramp_length_mm(lower, higher) <= rounding {
         return higher;
     }
-    let above = change_within(law, higher, half * length_mm);
+    let above = change_within(law, higher, length_mm.half());
     // Subtracted, because the sum may be beyond fixed point.
     let fits = |feed: R| law.ramp_length_mm(lower, feed) <= length_mm - law.ramp_length_mm(higher, feed);
     if step <= R::ZERO {
@@ -156,8 +155,8 @@ pub fn peak<R: Root>(law: &Law<R>, from_mm_s: R, to_mm_s: R, length_mm: R) -> R 
     }
     // The peak is `higher` + y³. It lies between what either feed alone would reach in half the
     // length, and in y the total length is increasing and convex.
-    let upper = above.max(change_within(law, lower, half * length_mm) - step);
-    let mut y = upper.cbrt() + R::MARGIN;
+    let upper = above.max(change_within(law, lower, length_mm.half()) - step);
+    let mut y = upper.cbrt().rounded_up();
     let (two, three) = (R::from_f64(2.0), R::from_f64(3.0));
     let (snap_root, snap_limited_to) = (law.snap_root(), law.snap_limited_to_mm_s());
     for _ in 0..NEWTON_STEPS_MAX {
@@ -202,9 +201,8 @@ fn time<R: Root>(law: &Law<R>, change: R, by_y: R) -> (R, R) {
 
 /// Length of the ramp from `lower` by `change`, and its derivative by y, from its time and that derivative.
 fn length<R: Root>(lower: R, change: R, (time, time_slope): (R, R), by_y: R) -> (R, R) {
-    let half = R::from_f64(0.5);
-    let mean = lower + half * change;
-    (mean * time, half * time * by_y + mean * time_slope)
+    let mean = lower + change.half();
+    (mean * time, time.half() * by_y + mean * time_slope)
 }
 
 #[cfg(test)]

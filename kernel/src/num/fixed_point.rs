@@ -237,7 +237,10 @@ impl Root for Fixed {
     const LIMITS: (f64, f64) = (1.0, 1.0e9);
     const FEEDS_MM_S: (f64, f64) = (1.0e-3, 1.0e6);
     const LENGTH_MIN_MM: f64 = 1.0e-6;
-    const MARGIN: Self = Self::from_bits(8);
+
+    fn rounded_up(self) -> Self {
+        self + Self::from_bits(8)
+    }
 
     /// Rounded down; 0 for what is below it.
     fn sqrt(self) -> Self {

@@ -6,7 +6,7 @@ use super::cube_root::{cbrt, cbrtf};
 use super::{Real, Root, Scalar, Unit};
 
 macro_rules! float {
-    ($float:ident, $sqrt:path, $cbrt:ident, terms: $terms:literal, piece_mm: $piece:literal, ramp_mm: $ramp:literal, q32: $from_q32:path, $q32:path, fraction: |$f:ident| $fraction:expr) => {
+    ($float:ident, $sqrt:path, $cbrt:ident, $half:path, terms: $terms:literal, piece_mm: $piece:literal, ramp_mm: $ramp:literal, q32: $from_q32:path, $q32:path, fraction: |$f:ident| $fraction:expr) => {
         impl Scalar for $float {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
@@ -88,7 +88,11 @@ macro_rules! float {
             const LIMITS: (f64, f64) = (0.0, f64::INFINITY);
             const FEEDS_MM_S: (f64, f64) = (0.0, f64::INFINITY);
             const LENGTH_MIN_MM: f64 = 0.0;
-            const MARGIN: Self = 0.0;
+
+            #[inline]
+            fn rounded_up(self) -> Self {
+                self
+            }
 
             #[inline]
             fn sqrt(self) -> Self {
@@ -103,6 +107,16 @@ macro_rules! float {
             #[inline]
             fn cbrt_quotient(self, per: Self) -> Self {
                 $cbrt(self / per)
+            }
+
+            #[inline]
+            fn half(self) -> Self {
+                $half(self)
+            }
+
+            #[inline]
+            fn half_product(self, by: Self) -> Self {
+                $half(self * by)
             }
 
             #[inline]
@@ -134,10 +148,30 @@ macro_rules! float {
 }
 
 // f32 keeps the top word only: one conversion instruction on a core with a single-precision FPU.
-float!(f32, libm::sqrtf, cbrtf, terms: 7, piece_mm: 16.0, ramp_mm: 16.0e3, q32: f32_from_q32, f32_to_q32,
+float!(f32, libm::sqrtf, cbrtf, half_f32, terms: 7, piece_mm: 16.0, ramp_mm: 16.0e3, q32: f32_from_q32, f32_to_q32,
     fraction: |fraction| (fraction >> 32) as u32 as Self * (1.0 / 4_294_967_296.0));
-float!(f64, libm::sqrt, cbrt, terms: 12, piece_mm: 1.0e6, ramp_mm: 1.0e9, q32: f64_from_q32, f64_to_q32,
+float!(f64, libm::sqrt, cbrt, half_f64, terms: 12, piece_mm: 1.0e6, ramp_mm: 1.0e9, q32: f64_from_q32, f64_to_q32,
     fraction: |fraction| (fraction >> 11) as Self * (1.0 / 9_007_199_254_740_992.0));
+
+#[inline]
+fn half_f32(x: f32) -> f32 {
+    x * 0.5
+}
+
+/// A product is a subroutine on a core without f64, and a halved exponent is not.
+#[inline]
+fn half_f64(x: f64) -> f64 {
+    if cfg!(target_pointer_width = "32") { half_by_exponent(x) } else { x * 0.5 }
+}
+
+#[inline(never)]
+fn half_by_exponent(x: f64) -> f64 {
+    /// One, as an exponent in its place.
+    const ONE: u64 = 1 << (f64::MANTISSA_DIGITS - 1);
+    let exponent = x.to_bits() & f64::INFINITY.to_bits();
+    let is_halved = exponent > ONE && exponent < f64::INFINITY.to_bits();
+    if is_halved { f64::from_bits(x.to_bits() - ONE) } else { x * 0.5 }
+}
 
 /// Whether `x` is a number, and not infinite. By its bits: the library's becomes a hundred bytes wherever it
 /// is asked on a core without f64.
@@ -231,6 +265,18 @@ mod tests {
             assert_eq!(f32_to_q32(x), (x * 2_147_483_648.0) as i64 * 2, "{x:e}");
         }
         assert_eq!(f32_to_q32(f32::NAN), 0);
+    }
+
+    /// Against products, over all exponents and both signs.
+    #[test]
+    fn halves_are_products() {
+        let random = Random::new(4);
+        let ends = [0.0, -0.0, f64::INFINITY, f64::MIN_POSITIVE, 2.0 * f64::MIN_POSITIVE, f64::MAX];
+        let all = (0..1_000_000).map(|_| f64::from_bits(random.next())).filter(|x| !x.is_nan());
+        for x in all.chain(ends) {
+            assert_eq!(half_by_exponent(x).to_bits(), (x * 0.5).to_bits(), "{x:e}");
+        }
+        assert!(half_by_exponent(f64::NAN).is_nan());
     }
 
     /// Against the language's own, over all exponents and both signs.

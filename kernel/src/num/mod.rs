@@ -162,10 +162,11 @@ pub trait Root: Real + Div<Output = Self> {
     const FEEDS_MM_S: (f64, f64);
     /// The shortest length of a block that has any \[mm\].
     const LENGTH_MIN_MM: f64;
-    /// What is added to times and curvatures so that rounding never makes them too small; nothing in
-    /// floats, whose rounding is a part of the value.
-    const MARGIN: Self;
 
+    /// A time or a curvature a little greater, so that rounding never makes it too small; in floats it is the
+    /// same, whose rounding is a part of the value.
+    #[must_use]
+    fn rounded_up(self) -> Self;
     /// Square root; `self` ≥ 0.
     #[must_use]
     fn sqrt(self) -> Self;
@@ -175,6 +176,16 @@ pub trait Root: Real + Div<Output = Self> {
     /// (self/per)^⅓ for `per` > 0. Fixed point divides the roots: the quotient may be too small for it.
     #[must_use]
     fn cbrt_quotient(self, per: Self) -> Self;
+    /// self/2.
+    #[must_use]
+    fn half(self) -> Self {
+        self * Self::from_f64(0.5)
+    }
+    /// self·by/2. Fixed point rounds the result alone, to the nearest, and saturates.
+    #[must_use]
+    fn half_product(self, by: Self) -> Self {
+        self.times_per(by, Self::from_f64(2.0))
+    }
     /// self·by/per. Fixed point rounds the result alone, to the nearest, and saturates.
     #[must_use]
     fn times_per(self, by: Self, per: Self) -> Self;

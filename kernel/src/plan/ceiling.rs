@@ -85,7 +85,7 @@ impl<R: Root> Bend<R> {
         let turn = planar / radius_mm;
         // A quotient beyond the type's range has already saturated.
         let is_small = turn <= R::from_f64(R::LIMITS.1);
-        let more = |bend: R| if is_small { bend + R::MARGIN } else { bend };
+        let more = |bend: R| if is_small { bend.rounded_up() } else { bend };
         Self {
             curvature_per_mm: more(planar * turn),
             third_root_per_mm: more(planar.sqrt() * turn),
@@ -200,7 +200,7 @@ impl<R: Root> Ceiling<R> {
         // The ramps' budget at the ceiling itself, where it is smallest. κ·v, √κ'·v and ∛κ''·v are angular
         // speeds; multiplied by one feed or acceleration at a time, no product exceeds a limit.
         let constant = R::from_f64;
-        let [w1, w2, w3] = bends.map(|bend| bend * feed + R::MARGIN);
+        let [w1, w2, w3] = bends.map(|bend| (bend * feed).rounded_up());
         let normal_accel = w1 * feed;
         let along_jerk = w2 * (w2 * feed);
         let across_snap = w3 * (w3 * (w3 * feed));

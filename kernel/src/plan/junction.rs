@@ -36,7 +36,7 @@ pub fn junction<R: Root>(junction: &Junction<R>, angle_max_rad: R, accel_step_mm
     let two_step = step + step;
     // Rounding of fixed point makes it larger, not smaller.
     let sum = kink + kink.root_of_squares((bend + bend).sqrt_product(two_step));
-    two_step / if sum > R::ZERO { sum + R::MARGIN } else { sum }
+    two_step / if sum > R::ZERO { sum.rounded_up() } else { sum }
 }
 
 #[cfg(test)]

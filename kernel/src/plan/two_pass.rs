@@ -240,7 +240,8 @@ fn forward<R: Root>(
             Some(next) => block.cap_mm_s.min(block.junction_mm_s).min(next.cap_mm_s),
             None => end,
         };
-        let exit = if allowed > feed {
+        // Looking whether there is room is cheaper than solving.
+        let exit = if allowed > feed && block.law.ramp_length_mm(feed, allowed) > block.length_mm {
             let reached = allowed.min(reach(&block.law, feed, block.length_mm));
             if after.is_empty() && reached < end {
                 return Err(PlanError::TooShortToAccelerate {
