@@ -15,11 +15,9 @@
 use fixed::types::I32F32;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::num::Real;
+use crate::num::{Real, in_q32, is_within, of_q32};
 
 const STEPS_PER_MM: f64 = 4_294_967_296.0;
-/// What it adds to a float's exponent, in place: products and comparisons of f64 are software on most targets.
-const STEPS_EXPONENT: u64 = 32 << (f64::MANTISSA_DIGITS - 1);
 
 /// A position or a length in mm, in steps of 2⁻³² mm (0.23 pm), from −2³¹ to 2³¹ mm.
 ///
@@ -61,16 +59,13 @@ impl Position {
     #[must_use]
     #[inline(never)]
     pub fn from_mm(mm: f64) -> Option<Self> {
-        let magnitude = mm.to_bits() << 1 >> 1;
-        // As floats are ordered, so are the bits of positive ones; what is no number is above all.
-        if magnitude > Self::LIMIT_MM.to_bits() {
+        if !is_within(mm, -Self::LIMIT_MM, Self::LIMIT_MM) {
             return None;
         }
         // Below 2⁵² steps. With 2⁵² on top the float's last place is a step: the sum is rounded to it, halves
         // to even, and its lower bits are the number of steps.
         const STEP_IS_LAST: f64 = 4_503_599_627_370_496.0;
-        // 0 becomes a number that is lost in the sum.
-        let steps = f64::from_bits(magnitude + STEPS_EXPONENT) + STEP_IS_LAST;
+        let steps = in_q32(libm::fabs(mm)) + STEP_IS_LAST;
         let steps = (steps.to_bits() - STEP_IS_LAST.to_bits()).cast_signed();
         Some(Self::from_bits(if mm.is_sign_negative() { -steps } else { steps }))
     }
@@ -79,9 +74,7 @@ impl Position {
     #[must_use]
     #[inline(never)]
     pub fn to_mm(self) -> f64 {
-        // Rounded once to a float, whose exponent is that of steps.
-        let steps = (self.to_bits() as f64).to_bits();
-        f64::from_bits(if steps == 0 { 0 } else { steps - STEPS_EXPONENT })
+        of_q32(self.to_bits() as f64)
     }
 
     /// Whether it is within ±[`Self::LIMIT_MM`].

@@ -79,6 +79,16 @@ impl<R: Root> JerkPulse<R> {
         self.accel_mm_s2().half() * moment
     }
 
+    /// What is gained by its end, where jerk and snap are 0.
+    pub(super) fn end(&self) -> FeedState<R> {
+        FeedState {
+            s_mm: self.length_mm(),
+            v_mm_s: self.speed_mm_s(),
+            a_mm_s2: self.accel_mm_s2(),
+            ..FeedState::default()
+        }
+    }
+
     /// The feed gained in its closing edge: what acceleration gains at its peak, less what it is below that.
     pub(super) fn closing_mm_s(&self) -> R {
         self.accel_mm_s2() * self.edge_s - self.gained(&Shape::middle()).v_mm_s

@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 
 use self::tick_pulse::TickPulse;
 use super::ramp::Ramp;
-use crate::num::{Real, Root, Unit, is_within, rolled, whole};
+use crate::num::{Real, Root, Unit, in_q32, is_within, of_q32, rolled, whole};
 use crate::units::Position;
 
 #[cfg(feature = "live")]
@@ -43,14 +43,13 @@ impl Ticks {
     #[must_use]
     pub fn from_seconds(seconds: f64, tick_s: f64) -> Option<Self> {
         let ticks = seconds / tick_s;
-        is_within(ticks, 0.0, Self::LIMIT).then(|| Self(whole(ticks * 4_294_967_296.0 + 0.5)))
+        is_within(ticks, 0.0, Self::LIMIT).then(|| Self(whole(in_q32(ticks) + 0.5)))
     }
 
     /// The duration in ticks.
     #[must_use]
     pub fn to_f64(self) -> f64 {
-        // Halves are exact in f64, and their sum is rounded once.
-        f64::from((self.0 >> 32) as u32) + f64::from(self.0 as u32) / 4_294_967_296.0
+        of_q32(self.0 as f64)
     }
 
     /// Sum; saturates at 2³² ticks.
@@ -173,8 +172,8 @@ impl Clock {
     fn new(duration: Ticks) -> Self {
         let step = match duration.0 {
             0 => 0,
-            bits if bits > Ticks::ONE.0 => quotient(Ticks::ONE.0, 0, bits),
-            bits => quotient(0, u64::MAX, bits),
+            bits if bits > Ticks::ONE.0 => part(bits),
+            bits => u64::MAX / bits,
         };
         Self { duration, step }
     }
@@ -193,18 +192,19 @@ impl Clock {
     }
 }
 
-/// (high·2⁶⁴ + low)/by, rounded down, for high < by ≤ 2⁶³. Bit by bit: it is for the background, and a
-/// 128-bit division takes a kilobyte of flash.
-fn quotient(high: u64, low: u64, by: u64) -> u64 {
-    (0..u64::BITS).fold([high, low], |digits, _| next_digit(digits, by))[1]
-}
-
-/// Appends the next digit of a quotient, in place of the dividend's digits that are used up.
-// Not inlined, because the loop around it would be unrolled.
-#[inline(never)]
-fn next_digit([remainder, quotient]: [u64; 2], by: u64) -> [u64; 2] {
-    let (remainder, quotient) = (remainder << 1 | quotient >> 63, quotient << 1);
-    if remainder >= by { [remainder - by, quotient | 1] } else { [remainder, quotient] }
+/// 2⁹⁶/by, rounded down, for by from 2³² + 1 to 2⁶³. The lower digits bit by bit: it is for the background, and
+/// a 128-bit division takes a kilobyte of flash.
+fn part(by: u64) -> u64 {
+    // 2⁶⁴ − 1 divided, and what is left of 2⁶⁴: it may be all of `by`, which is one more in the first digit.
+    let upper = u64::MAX / by;
+    let mut remainder = (u64::MAX % by) + 1;
+    let mut lower = 0;
+    for _ in 0..rolled(u32::BITS) {
+        let is_one = remainder >= by;
+        lower = (lower + u64::from(is_one)) << 1;
+        remainder = (if is_one { remainder - by } else { remainder }) << 1;
+    }
+    (upper << 32) + lower + u64::from(remainder >= by)
 }
 
 /// a·b/2³² for b ≤ 2³².
@@ -325,8 +325,9 @@ impl<R: Real> FeedSegment<R> {
             R::checked_from_f64,
         );
         let of_ramp = ramp.pulse();
-        let (pulse, bent_mm) = TickPulse::new(&mut refused, &of_ramp);
-        let (hold_v, hold_a) = (from_mm_s + of_ramp.speed_mm_s(), of_ramp.accel_mm_s2());
+        let end = of_ramp.end();
+        let (pulse, bent_mm) = TickPulse::new(&mut refused, &of_ramp, &end);
+        let (hold_v, hold_a) = (from_mm_s + end.v_mm_s, end.a_mm_s2);
         let lengths = &[
             "entry feed · t1 [mm]",
             "exit feed · t1 [mm]",
@@ -337,7 +338,7 @@ impl<R: Real> FeedSegment<R> {
         let lengths_mm = [
             from_mm_s * t1_s - bent_mm,
             to_mm_s * t1_s + bent_mm,
-            from_mm_s * t1_s + of_ramp.length_mm(),
+            from_mm_s * t1_s + end.s_mm,
             hold_v * hold_s,
             0.5 * hold_a * hold_s * hold_s,
         ];

@@ -6,6 +6,7 @@
 use super::list::Item;
 use super::lookahead::{AheadBlock, FEED_ROUNDING, Lookahead};
 use super::splice::{SLIVER, Splice};
+use crate::law::passing::Passing;
 use crate::law::{Law, Limits, Phase, PlannedRamp, Ramp, Ticks};
 use crate::units::Position;
 
@@ -94,7 +95,7 @@ impl<const PLACES: usize> Lookahead<PLACES> {
             } else if left < Position::ZERO {
                 return None;
             }
-            let crossed = |block: &AheadBlock| (block.start() - from.at).to_mm() < length_mm;
+            let crossed = |block: &AheadBlock| block.start() < from.at + length;
             let least = self
                 .from(from)
                 .take_while(crossed)
@@ -156,6 +157,7 @@ impl<const PLACES: usize> Lookahead<PLACES> {
         feed_override: f64,
     ) -> bool {
         let rising = ramp.reversed();
+        let passing = Passing::new(&rising);
         let length_mm = ramp.length_mm();
         let mut junction_mm_s = f64::INFINITY;
         for block in self.from(from) {
@@ -163,11 +165,13 @@ impl<const PLACES: usize> Lookahead<PLACES> {
             // At the ramp's start the feed is given and can't be lowered.
             let cap_mm_s = if at_mm > 0.0 { block.allowed(feed_override).0 } else { f64::INFINITY };
             let most_mm_s = f64::min(cap_mm_s, junction_mm_s) * (1.0 + FEED_ROUNDING);
-            let is_slow = ramp.from_mm_s <= most_mm_s
-                || length_mm - rising.length_to_feed_mm(most_mm_s) <= at_mm + LENGTH_ROUNDING_MM;
             if at_mm > length_mm {
                 break;
             }
+            // Where it has come down to that feed, from the start of its mirror image. Most often bounds tell.
+            let is_here = |passed_mm: f64| length_mm - passed_mm <= at_mm + LENGTH_ROUNDING_MM;
+            let (least_mm, most_mm) = passing.length_to_feed_mm(most_mm_s);
+            let is_slow = is_here(least_mm) || is_here(most_mm) && is_here(rising.length_to_feed_mm(most_mm_s));
             if !is_slow && block.start() > known {
                 return false;
             }

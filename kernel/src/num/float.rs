@@ -179,10 +179,31 @@ pub(crate) fn is_finite(x: f64) -> bool {
     x.to_bits() << 1 < f64::INFINITY.to_bits() << 1
 }
 
-/// Whether `x` is a number from `least` to `most`.
+/// Whether `x` is a number from `least` to `most`. By their bits, as numbers are ordered: a comparison is a
+/// subroutine on a core without f64.
 #[inline(never)]
 pub(crate) fn is_within(x: f64, least: f64, most: f64) -> bool {
-    least <= x && x <= most
+    let order = |x: f64| {
+        let magnitude = (x.to_bits() << 1 >> 1).cast_signed();
+        if x.is_sign_negative() { -magnitude } else { magnitude }
+    };
+    (order(least)..=order(most)).contains(&order(x))
+}
+
+/// 2³², as what it adds to an exponent in its place.
+const Q32: u64 = 32 << (f64::MANTISSA_DIGITS - 1);
+
+/// A quantity in steps of 2⁻³², not rounded; for 0 and what is not too great for that. By its exponent, because a
+/// product is a subroutine on a core without f64.
+pub(crate) fn in_q32(x: f64) -> f64 {
+    let bits = x.to_bits();
+    f64::from_bits(if bits << 1 == 0 { bits } else { bits.wrapping_add(Q32) })
+}
+
+/// The quantity that is `steps` of 2⁻³²; for 0 and what is not too small for that.
+pub(crate) fn of_q32(steps: f64) -> f64 {
+    let bits = steps.to_bits();
+    f64::from_bits(if bits << 1 == 0 { bits } else { bits.wrapping_sub(Q32) })
 }
 
 /// `x` without its fraction, for 0 ≤ x < 2⁶⁴; of anything else some number. The language's casts of f64
@@ -279,6 +300,17 @@ mod tests {
         assert!(half_by_exponent(f64::NAN).is_nan());
     }
 
+    /// Against products.
+    #[test]
+    fn scaled_numbers_are_products() {
+        let random = Random::new(6);
+        for x in (0..100_000).map(|_| random.log(1e-140, 1e140)).chain([0.0, 1.0]) {
+            assert_eq!(in_q32(x), x * 4_294_967_296.0, "{x:e}");
+            assert_eq!(in_q32(-x).to_bits(), (-x * 4_294_967_296.0).to_bits(), "{x:e}");
+            assert_eq!(of_q32(in_q32(-x)).to_bits(), (-x).to_bits(), "{x:e}");
+        }
+    }
+
     /// Against the language's own, over all exponents and both signs.
     #[test]
     fn whole_and_finite_are_the_languages() {
@@ -300,6 +332,8 @@ mod tests {
         for x in [f64::INFINITY, f64::NEG_INFINITY, f64::NAN, f64::MAX, f64::MIN, 0.0, -0.0] {
             assert_eq!(is_finite(x), x.is_finite(), "{x:e}");
             assert_eq!(is_within(x, 0.0, f64::MAX), x >= 0.0 && x.is_finite(), "{x:e}");
+            assert_eq!(is_within(x, -0.0, f64::MAX), x >= 0.0 && x.is_finite(), "{x:e}");
+            assert_eq!(is_within(x, f64::NEG_INFINITY, -1.0), x <= -1.0, "{x:e}");
         }
     }
 }

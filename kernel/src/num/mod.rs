@@ -39,7 +39,7 @@ pub(crate) mod sine;
 mod table;
 
 pub use fixed_point::Fixed;
-pub(crate) use float::{is_finite, is_within, whole};
+pub(crate) use float::{in_q32, is_finite, is_within, of_q32, whole};
 pub use series::Coefficients;
 pub(crate) use series::SERIES_TERMS_MAX;
 

@@ -22,8 +22,9 @@ use core::f64::consts::PI;
 
 use super::{SegmentError, made, portion, times};
 use crate::law::pulse::JerkPulse;
+use crate::law::ramp::FeedState;
 use crate::law::shape::Shape;
-use crate::num::{Real, Unit, is_within, whole};
+use crate::num::{Real, Unit, in_q32, is_within, whole};
 use crate::units::Position;
 
 /// One, in 32 fractional bits.
@@ -100,10 +101,14 @@ impl<R: Real> TickPulse<R> {
         end_gain_mm_s: R::ZERO,
     };
 
-    /// `pulse`, and its bend Jp·(2e)²·P/(8π²) \[mm\], which a segment's linear term lacks in a rise. The first
-    /// reason to refuse it is kept.
+    /// `pulse`, which has gained `end` by its end, and its bend Jp·(2e)²·P/(8π²) \[mm\], which a segment's linear
+    /// term lacks in a rise. The first reason to refuse it is kept.
     #[inline(never)]
-    pub(super) fn new(refused: &mut Option<SegmentError>, pulse: &JerkPulse<f64>) -> (Self, f64) {
+    pub(super) fn new(
+        refused: &mut Option<SegmentError>,
+        pulse: &JerkPulse<f64>,
+        end: &FeedState<f64>,
+    ) -> (Self, f64) {
         let &JerkPulse { jerk_mm_s3: jerk, edge_s, duration_s: pulse_s } = pulse;
         if !(pulse_s > 0.0) {
             return (Self::NONE, 0.0);
@@ -111,15 +116,15 @@ impl<R: Real> TickPulse<R> {
         let arch_s = edge_s + edge_s;
         let arches = pulse_s / arch_s;
         // A pulse may be shorter than its edges by rounding.
-        let steps = if arches > 1.0 { arches * ONE as f64 } else { ONE as f64 };
+        let steps = if arches > 1.0 { in_q32(arches) } else { ONE as f64 };
         if !is_within(steps, 0.0, MOST_ARCHES * ONE as f64) {
             refused.get_or_insert(SegmentError::OutOfRange { quantity: "t1 / edges", value: arches });
         }
         let steps = if is_within(steps, 0.0, MOST_ARCHES * ONE as f64) { steps } else { ONE as f64 };
         let arches = whole(steps);
-        let arches_low = whole((steps - arches as f64) * ONE as f64);
+        let arches_low = whole(in_q32(steps - arches as f64));
         let edge = if arches > ONE {
-            whole(ONE as f64 * (ONE as f64 / (steps + steps) * ONE as f64))
+            whole(in_q32(in_q32(ONE as f64 / (steps + steps))))
         } else {
             1 << 63
         };
@@ -129,19 +134,19 @@ impl<R: Real> TickPulse<R> {
         let length = speed * arch_s;
         let middle = Shape::<f64>::middle();
         let (edge_a, edge_v, edge_mm) = (accel * middle.accel, speed * middle.speed, length * middle.length);
-        let (end_a, end_v, end_mm) = (pulse.accel_mm_s2(), pulse.speed_mm_s(), pulse.length_mm());
+        let &FeedState { s_mm: end_mm, v_mm_s: end_v, a_mm_s2: end_a, .. } = end;
         let bent_mm = speed * pulse_s / (8.0 * PI * PI);
         let square_s2 = pulse_s * pulse_s;
         // The segment's linear term lacks the bend, which is an edge's alone.
         // Without a plateau its figures are not used, so they can't be a reason to refuse it.
-        let plateau = if arches > ONE { 1.0 } else { 0.0 };
+        let of_plateau = |value| if arches > ONE { value } else { 0.0 };
         let plateau_mm = edge_mm + bent_mm * (edge_s / pulse_s);
         let lengths_mm = [
             length / 12.0,
-            plateau * plateau_mm,
-            plateau * (edge_v * pulse_s + bent_mm),
-            plateau * (0.5 * edge_a * square_s2),
-            plateau * (jerk * square_s2 * pulse_s / 6.0),
+            of_plateau(plateau_mm),
+            of_plateau(edge_v * pulse_s + bent_mm),
+            of_plateau(0.5 * edge_a * square_s2),
+            of_plateau(jerk * square_s2 * pulse_s / 6.0),
             end_mm + bent_mm,
             end_v * pulse_s,
             0.5 * end_a * square_s2,
@@ -181,9 +186,9 @@ impl<R: Real> TickPulse<R> {
             snap,
             edge_v,
             edge_a,
-            plateau * (edge_a * pulse_s),
-            plateau * (jerk * pulse_s),
-            plateau * (0.5 * jerk * square_s2),
+            of_plateau(edge_a * pulse_s),
+            of_plateau(jerk * pulse_s),
+            of_plateau(0.5 * jerk * square_s2),
             end_v,
             end_a,
             end_a * pulse_s,
