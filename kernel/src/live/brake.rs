@@ -171,7 +171,8 @@ impl<const PLACES: usize> Lookahead<PLACES> {
             // Where it has come down to that feed, from the start of its mirror image. Most often bounds tell.
             let is_here = |passed_mm: f64| length_mm - passed_mm <= at_mm + LENGTH_ROUNDING_MM;
             let (least_mm, most_mm) = passing.length_to_feed_mm(most_mm_s);
-            let is_slow = is_here(least_mm) || is_here(most_mm) && is_here(rising.length_to_feed_mm(most_mm_s));
+            let is_slow =
+                is_here(least_mm) || is_here(most_mm) && is_here(rising.length_to_feed_mm(most_mm_s));
             if !is_slow && block.start() > known {
                 return false;
             }

@@ -7,7 +7,7 @@ use super::mode::{Blocks, Mode, Request, Run};
 use super::places::Takeover;
 use super::reader::Reader;
 use super::splice::{BlockEnd, Extent};
-use super::timeline::{Leads, Timeline};
+use super::timeline::{Handing, Leads, Timeline};
 use crate::hal::OutputState;
 use crate::law::Pulse;
 use crate::num::Real;
@@ -317,26 +317,33 @@ where
             chooser.feed.roll_back();
             return Ok(false);
         }
-        self.block_end = chooser.block_end;
+        let block_end = chooser.block_end;
+        let acted = self.act(choice, list, (!is_stop).then_some(is_stop_asked), feeder);
+        if let Ok(Handing::GivenUp) = acted {
+            self.reader.feed_mut().roll_back();
+            return Ok(false);
+        }
+        self.block_end = block_end;
         if request.is_some() {
             // What can't be done now can't be done in the next poll either; motion ends at rest anyway.
             self.mode.clear_request();
         }
-        self.act(choice, list, feeder)?;
-        Ok(true)
+        acted.map(|_| true)
     }
 
-    /// Acts on a choice: hands the list over and moves the program's feed accordingly.
+    /// Acts on a choice: hands the list over, `unless` a stop is asked for meanwhile, and moves the program's feed
+    /// accordingly.
     fn act(
         &mut self,
         choice: Choice,
         mut list: List,
+        unless: Option<&dyn Fn() -> bool>,
         feeder: &mut LiveFeeder<'_, R, AXES>,
-    ) -> Result<(), SupplyError<E>> {
+    ) -> Result<Handing, SupplyError<E>> {
         let Self { reader, timeline, .. } = self;
         let exit = timeline.list().exit();
         let (takeover, feed_override) = match choice {
-            Choice::Nothing => return Ok(()),
+            Choice::Nothing => return Ok(Handing::Done),
             Choice::Follow { feed_override } => (Takeover::After(exit), feed_override),
             Choice::TakeOver { takeover, feed_override } => (takeover, feed_override),
             Choice::Rest { after, ends_block } => {
@@ -346,15 +353,19 @@ where
             }
             Choice::EndBlock => {
                 timeline.end_block();
-                return Ok(());
+                return Ok(Handing::Done);
             }
-            Choice::DriveToEnd if !timeline.drive_to_end() => return Ok(()),
+            Choice::DriveToEnd if !timeline.drive_to_end() => return Ok(Handing::Done),
             Choice::DriveToEnd | Choice::Replan => {
                 reader.feed_mut().replan_from(timeline.splice().stretch);
-                return Ok(());
+                return Ok(Handing::Done);
             }
         };
-        timeline.hand_over(list, takeover, feed_override, reader.lookahead(), feeder)?;
+        let handing =
+            timeline.hand_over(list, takeover, feed_override, reader.lookahead(), unless, feeder)?;
+        if handing == Handing::GivenUp {
+            return Ok(handing);
+        }
         let (feed, stretch) = (reader.feed_mut(), timeline.splice().stretch);
         let is_planned_anew = matches!(choice, Choice::TakeOver { .. });
         if is_planned_anew {
@@ -364,7 +375,7 @@ where
         if is_planned_anew {
             feed.replan_from(stretch);
         }
-        Ok(())
+        Ok(Handing::Done)
     }
 
     /// If data came too late, motion is in a fallback stop: the next list begins at its end. A stop at the

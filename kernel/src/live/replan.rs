@@ -67,7 +67,7 @@ pub(super) fn replan<const BLOCKS: usize>(
     // Merged blocks share their lowest limits, which may be too low to brake immediately; then retry with
     // equal ones merged only.
     for alike in [ALIKE, 0.0] {
-        let mut blocks = Blocks::<BLOCKS>::new(lookahead, from, feed_override, end, alike)?;
+        let mut blocks = Blocks::<BLOCKS>::new(attention, lookahead, from, feed_override, end, alike)?;
         let planned = blocks.plan(attention, from, ramps, list);
         if planned.is_some() {
             return planned;
@@ -90,9 +90,10 @@ struct Blocks<const BLOCKS: usize> {
 
 impl<const BLOCKS: usize> Blocks<BLOCKS> {
     /// Blocks from a splice to `end`. Neighbours with the same ceiling are merged and get their least limits,
-    /// if these are at most the fraction `alike` below the greatest ones.
+    /// if these are at most the fraction `alike` below the greatest ones. `None` if something more urgent waits.
     #[inline(never)]
     fn new(
+        attention: &Attention<'_>,
         lookahead: &Lookahead<BLOCKS>,
         from: &Splice,
         feed_override: f64,
@@ -103,6 +104,9 @@ impl<const BLOCKS: usize> Blocks<BLOCKS> {
         // A sliver of a block belongs to the next block.
         let (mut start, mut most) = (from.at, None::<Limits<f64>>);
         for block in lookahead.from(from).take_while(|block| block.start() < end) {
+            if attention.is_wanted() {
+                return None;
+            }
             let (cap_mm_s, limits) = block.allowed(feed_override);
             let block_end = block.end().min(end);
             if block_end - start <= SLIVER && block_end < end {

@@ -20,6 +20,14 @@ use crate::units::Position;
 /// A ramp is cut at most this many ticks after the progress last seen.
 const LEAD_TICKS_MAX: u64 = 64;
 
+/// How handing a list over ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Handing {
+    Done,
+    /// For a stop that was asked for.
+    GivenUp,
+}
+
 /// How far ahead of the progress last seen a ramp is changed \[ticks\]: as many as pass during an ordinary poll of this
 /// kind, if ticks can interrupt the background. Where that was too late, the lead grows by a tick, and stays.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -266,15 +274,17 @@ impl Timeline {
     }
 
     /// Hands over a list whose motion is under `feed_override`, and asks the tick to change to it. There must
-    /// be a free feed list. The next list begins at its exit.
+    /// be a free feed list. The next list begins at its exit. `unless` says whether a stop is asked for: then, and
+    /// where a fault asks for one, nothing is handed over and nothing changed.
     pub(super) fn hand_over<R: Real, E, const AXES: usize, const PLACES: usize>(
         &mut self,
         list: List,
         takeover: Takeover,
         feed_override: f64,
         lookahead: &Lookahead<PLACES>,
+        unless: Option<&dyn Fn() -> bool>,
         feeder: &mut LiveFeeder<'_, R, AXES>,
-    ) -> Result<(), SupplyError<E>> {
+    ) -> Result<Handing, SupplyError<E>> {
         let (from, before) = (R::from_f64(list.start().feed_mm_s), self.density_before(takeover));
         let id = feeder.begin(list.start().at, from, before);
         let id = id.ok_or(SupplyError::Rejected(Rejection::full("feed lists", LISTS.into())))?;
@@ -284,18 +294,19 @@ impl Timeline {
             after: takeover.driven() as u32,
             within: matches!(takeover, Takeover::Within(_)),
         };
-        let is_asked = self
-            .fill(&list, id, lookahead, feeder)
-            .and_then(|()| feeder.change(change).map_err(SupplyError::Rejected));
-        if let Err(error) = is_asked {
+        let handing = match self.fill(&list, id, lookahead, unless, feeder) {
+            Ok(Handing::Done) => feeder.change(change).map(|()| Handing::Done).map_err(SupplyError::Rejected),
+            filled => filled,
+        };
+        if !matches!(handing, Ok(Handing::Done)) {
             feeder.give_up(id);
-            return Err(error);
+            return handing;
         }
         self.splice = list.exit_splice();
         let before_override = core::mem::replace(&mut self.driven_override, feed_override);
         let handed = Handed { id, list, before };
         self.next = Some(Next { handed, request: None, before_override });
-        Ok(())
+        handing
     }
 
     fn fill<R: Real, E, const AXES: usize, const PLACES: usize>(
@@ -303,10 +314,14 @@ impl Timeline {
         list: &List,
         id: u8,
         lookahead: &Lookahead<PLACES>,
+        unless: Option<&dyn Fn() -> bool>,
         feeder: &mut LiveFeeder<'_, R, AXES>,
-    ) -> Result<(), SupplyError<E>> {
+    ) -> Result<Handing, SupplyError<E>> {
         let mut has_room = !list.is_overfull();
         for (start, item) in list.placed() {
+            if unless.is_some_and(|is_stop_asked| is_stop_asked() || feeder.is_stop_wanted()) {
+                return Ok(Handing::GivenUp);
+            }
             let is_taken = match item.ready(self.tick_s).map_err(SupplyError::Segment)? {
                 FeedItem::Segment(segment) => is_taken(feeder.segment(id, segment)),
                 FeedItem::EndOfStretch => {
@@ -324,7 +339,7 @@ impl Timeline {
             }
         }
         if has_room {
-            Ok(())
+            Ok(Handing::Done)
         } else {
             Err(SupplyError::Rejected(Rejection::full("items of a feed list", LIST_ITEMS)))
         }

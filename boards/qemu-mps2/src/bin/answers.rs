@@ -51,7 +51,8 @@ fn run(seed: u32, bytes: &[u8], counter: &Counter) {
     kernel.enable(0);
     let mut control =
         LiveControl::<_, AXES, _, _, PLACES>::new(program.items(), header.pulse, header.tick_s, Leads::NONE);
-    let (mut random, mut wait) = (u64::from(seed), 0);
+    // The first poll reads as much of the program as there is room for: no command is answered by that.
+    let (mut random, mut wait) = (u64::from(seed), 1);
     for _ in 0..TICKS_MAX {
         let mut kind = None;
         if wait == 0 {
@@ -78,11 +79,14 @@ fn run(seed: u32, bytes: &[u8], counter: &Counter) {
         wait -= 1;
         // In steps of the timer.
         let (since, longest, whole) = (Cell::new(now()), Cell::new(0), Cell::new(0));
+        // A stop is handed over without a look, and before more of the program is read, which has many.
+        let first = Cell::new(None);
         let look = || {
             let at = now();
             let step = at.wrapping_sub(since.replace(at)) & WRAP;
             longest.set(step.max(longest.get()));
             whole.set(whole.get() + u64::from(step));
+            first.set(first.get().or(Some(step)));
             false
         };
         let polled = control.poll_unless(&look, &mut feeder);
@@ -90,7 +94,8 @@ fn run(seed: u32, bytes: &[u8], counter: &Counter) {
         polled.unwrap_or_else(|error| fail(&error));
         println!("step {}", counter.instructions(longest.get().into()));
         if let Some(kind) = kind {
-            println!("{} {}", kind, counter.instructions(whole.get()));
+            let answer = if kind == "hold" { first.get().unwrap_or(0).into() } else { whole.get() };
+            println!("{} {}", kind, counter.instructions(answer));
         }
         let trace = kernel.tick(&mut intake, &mut memory);
         if trace.fault.is_some() {

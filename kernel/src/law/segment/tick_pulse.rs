@@ -123,11 +123,7 @@ impl<R: Real> TickPulse<R> {
         let steps = if is_within(steps, 0.0, MOST_ARCHES * ONE as f64) { steps } else { ONE as f64 };
         let arches = whole(steps);
         let arches_low = whole(in_q32(steps - arches as f64));
-        let edge = if arches > ONE {
-            whole(in_q32(in_q32(ONE as f64 / (steps + steps))))
-        } else {
-            1 << 63
-        };
+        let edge = if arches > ONE { whole(in_q32(in_q32(ONE as f64 / (steps + steps)))) } else { 1 << 63 };
         let snap = PI * jerk / arch_s;
         let accel = jerk * arch_s;
         let speed = accel * arch_s;

@@ -16,7 +16,7 @@ mod settle;
 
 use super::ascent::{Step, Steps};
 use crate::law::{Law, Limits, Pulse, Ramp, peak};
-use crate::plan::Block;
+use crate::plan::{Attention, Block};
 
 /// No node.
 const NONE: u32 = u32::MAX;
@@ -108,6 +108,8 @@ pub(super) struct Intervals<'a> {
     /// Greatest acceleration of any block.
     accel_mm_s2: f64,
     pulse: Pulse,
+    /// What all of it is given up for.
+    attention: &'a Attention<'a>,
 }
 
 /// A part of the stretch still to be visited: the minima it lies between, and the nodes next to its rest.
@@ -141,12 +143,13 @@ struct Gap {
 }
 
 impl<'a> Intervals<'a> {
-    /// Makes the nodes. `None` if there are too few places.
+    /// Makes the nodes. `None` if there are too few places. Where it is given up, not all have their roles.
     pub(super) fn new(
         blocks: &'a [Block<f64>],
         start_mm_s: f64,
         end_mm_s: f64,
         places: &'a mut [Node],
+        attention: &'a Attention<'a>,
     ) -> Option<Self> {
         let mut count = 0;
         let mut put = |node: Node| -> Option<()> {
@@ -210,7 +213,7 @@ impl<'a> Intervals<'a> {
         least::collect(nodes, blocks);
         let root = tree(nodes);
         let last = (count - 1) as u32;
-        let mut intervals = Self { blocks, nodes, accel_mm_s2, pulse };
+        let mut intervals = Self { blocks, nodes, accel_mm_s2, pulse, attention };
         intervals.find(Open { left_minimum: 0, left_bound: 0, right_minimum: last, right_bound: last, root });
         Some(intervals)
     }
@@ -239,6 +242,9 @@ impl<'a> Intervals<'a> {
         loop {
             let mut peak_mm_s = f64::INFINITY;
             while open.root != NONE {
+                if self.attention.is_wanted() {
+                    return;
+                }
                 let root = self.node(open.root);
                 let role = match self.classify(&open, &root) {
                     Class::BelowLeft => {
@@ -402,7 +408,7 @@ impl<'a> Intervals<'a> {
         between: u32,
         is_below: bool,
     ) -> f64 {
-        if !is_below {
+        if !is_below || self.attention.is_wanted() {
             return f64::INFINITY;
         }
         let Some(law) = self.law(between).filter(|_| between != NONE) else { return 0.0 };
@@ -421,7 +427,8 @@ impl<'a> Intervals<'a> {
     /// Approximate time lost \[s\] by resting in `root` on the way from `bound` over `gap` and further, over
     /// `beyond`, towards `other`.
     fn broken(&self, root: &Node, bound: &Node, gap: &Gap, other: &Node, beyond: &Gap, next: u32) -> f64 {
-        let Some(law) = self.law(next).filter(|_| next != NONE) else { return 0.0 };
+        let is_needed = next != NONE && !self.attention.is_wanted();
+        let Some(law) = self.law(next).filter(|_| is_needed) else { return 0.0 };
         let feed = root.feed_mm_s;
         let mean_mm_s = beyond.length_mm / beyond.ideal_s;
         if !(mean_mm_s > feed) {

@@ -61,20 +61,24 @@ pub(super) fn plan_spanning_unless(
 ) -> Result<Option<f64>, PlanError> {
     check(blocks, start_mm_s, end_mm_s)?;
     let room = places.len();
-    let Some(mut intervals) = Intervals::new(blocks, start_mm_s, end_mm_s, places) else {
+    let Some(mut intervals) = Intervals::new(blocks, start_mm_s, end_mm_s, places, attention) else {
         return Err(PlanError::Room { of: "nodes", needed: nodes_for(blocks.len()), places: room });
     };
     // Several kilobytes each, so used for all intervals.
     let (mut up, mut down) = (Ascent::NONE, Ascent::NONE);
     up.attend(attention);
     down.attend(attention);
-    let found = spanned(&mut intervals, &mut up, &mut down, put);
+    if attention.is_wanted() {
+        return Err(PlanError::GivenUp);
+    }
+    let found = spanned(attention, &mut intervals, &mut up, &mut down, put);
     // What was given up looks as if nothing fitted.
     if attention.is_wanted() { Err(PlanError::GivenUp) } else { Ok(found) }
 }
 
 /// The time of the ramps over all intervals \[s\].
 fn spanned(
+    attention: &Attention<'_>,
     intervals: &mut Intervals<'_>,
     up: &mut Ascent<'_>,
     down: &mut Ascent<'_>,
@@ -83,7 +87,7 @@ fn spanned(
     if !intervals.settle(|intervals, interval| lowest_fits(interval, intervals, up, down)) {
         return None;
     }
-    let mut out = Out { at_mm: 0.0, time_s: 0.0, put };
+    let mut out = Out { attention, at_mm: 0.0, time_s: 0.0, put };
     for interval in intervals.in_order() {
         out.cruise(interval.start_mm, interval.enter_mm_s);
         drive(&interval, intervals, up, down, &mut out)?;
@@ -93,6 +97,7 @@ fn spanned(
 
 /// The receiver of ramps, and where the next one starts.
 struct Out<'a, F> {
+    attention: &'a Attention<'a>,
     at_mm: f64,
     time_s: f64,
     put: &'a mut F,
@@ -112,7 +117,10 @@ impl<F: FnMut(f64, &Ramp<f64>)> Out<'_, F> {
     }
 
     fn put(&mut self, ramp: &Ramp<f64>) {
-        (self.put)(self.at_mm, ramp);
+        // To make each ready takes a while; of what is given up nothing is used.
+        if !self.attention.is_wanted() {
+            (self.put)(self.at_mm, ramp);
+        }
         self.time_s += ramp.duration_s();
     }
 }

@@ -194,7 +194,7 @@ mod tests {
 
     use super::*;
     use crate::law::Pulse;
-    use crate::plan::{Block, Node, nodes_for};
+    use crate::plan::{Attention, Block, Node, nodes_for};
     use crate::random::Random;
 
     /// An interval's list of blocks: rising steps, random feeds, up and down, or a random walk; one law or
@@ -230,11 +230,12 @@ mod tests {
     #[test]
     fn no_peak_of_a_scan_is_much_better() {
         let (mut lost, seed) = (Vec::new(), 20_261);
+        let attention = Attention::undivided();
         for case in 0..2000 {
             let random = Random::new(seed + 7919 * case as u64);
             let blocks = blocks(&random, case);
             let mut places = vec![Node::EMPTY; nodes_for(blocks.len())];
-            let mut intervals = Intervals::new(&blocks, 0.0, 0.0, &mut places).expect("places");
+            let mut intervals = Intervals::new(&blocks, 0.0, 0.0, &mut places, &attention).expect("places");
             let (mut up, mut down) = (Ascent::NONE, Ascent::NONE);
             if !intervals.settle(|intervals, interval| lowest_fits(interval, intervals, &mut up, &mut down)) {
                 continue;

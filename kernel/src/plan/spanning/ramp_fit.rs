@@ -147,12 +147,12 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
     /// Places `ramp`, the fastest within `limits`, after the steps that it may not pass earlier, and softens
     /// it by the limits of the blocks it passes.
     fn below_steps(&mut self, ramp: Ramp<f64>, limits: Limits<f64>, most_s: f64) -> Tried {
-        if self.attention.is_some_and(Attention::is_wanted) {
-            return Tried::TooSoft;
-        }
         let (mut ramp, mut limits) = (ramp, limits);
         // Blocks passed later may allow less, which makes the ramp longer.
         for _ in 0..LIMITS_STEPS {
+            if self.is_given_up() {
+                return Tried::TooSoft;
+            }
             let length_mm = ramp.length_mm();
             let own_s = ramp.duration_s() - length_mm / self.to_mm_s;
             if !(own_s < most_s) || self.start_mm + length_mm > self.room_mm {
@@ -198,6 +198,10 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
         self.between.get(self.hinders).is_some_and(is_late) || self.between.iter().any(is_late)
     }
 
+    fn is_given_up(&self) -> bool {
+        self.attention.is_some_and(Attention::is_wanted)
+    }
+
     /// The first start from which the ramp passes no step's feed before the step ends, if it is not after
     /// `latest_mm`.
     fn earliest_mm(&mut self, ramp: &Ramp<f64>, latest_mm: f64) -> Option<f64> {
@@ -235,6 +239,9 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
         if others_mm > at_mm {
             for step in self.between {
                 if about_mm(step).1 > at_mm {
+                    if self.is_given_up() {
+                        return None;
+                    }
                     at_mm = at_mm.max(exact_mm(step));
                 }
             }
