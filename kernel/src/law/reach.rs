@@ -89,7 +89,7 @@ fn change_within<R: Root>(law: &Law<R>, lower: R, length: R) -> R {
 fn pulse_within<R: Root>(law: &Law<R>, double_lower: R, length: R) -> R {
     let edge_mm_s2 = law.snap_time_s.half() * law.jerk_mm_s3;
     // All of these are above the root; x ≥ J'·P²/2 gives the second.
-    let by_jerk_s = (length + length).cbrt() / law.jerk_mm_s3.cbrt();
+    let by_jerk_s = (length + length).cbrt_quotient(law.jerk_mm_s3);
     let mut pulse_s = law.accel_time_s.min(by_jerk_s);
     if double_lower > R::ZERO {
         pulse_s = pulse_s.min(length.times_per(R::ONE, double_lower));
