@@ -172,8 +172,8 @@ impl Clock {
     fn new(duration: Ticks) -> Self {
         let step = match duration.0 {
             0 => 0,
-            bits if bits > Ticks::ONE.0 => part(bits),
-            bits => u64::MAX / bits,
+            bits if bits > Ticks::ONE.0 => quotient(Ticks::ONE.0, 0, bits),
+            bits => quotient(0, u64::MAX, bits),
         };
         Self { duration, step }
     }
@@ -192,19 +192,17 @@ impl Clock {
     }
 }
 
-/// 2⁹⁶/by, rounded down, for by from 2³² + 1 to 2⁶³. The lower digits bit by bit: it is for the background, and
-/// a 128-bit division takes a kilobyte of flash.
-fn part(by: u64) -> u64 {
-    // 2⁶⁴ − 1 divided, and what is left of 2⁶⁴: it may be all of `by`, which is one more in the first digit.
-    let upper = u64::MAX / by;
-    let mut remainder = (u64::MAX % by) + 1;
-    let mut lower = 0;
-    for _ in 0..rolled(u32::BITS) {
-        let is_one = remainder >= by;
-        lower = (lower + u64::from(is_one)) << 1;
-        remainder = (if is_one { remainder - by } else { remainder }) << 1;
+/// (high·2⁶⁴ + low)/by, rounded down, for high < by ≤ 2⁶³. Bit by bit: it is for the background, and a divider of
+/// 64 bits takes half a kilobyte of flash, one of 128 a kilobyte.
+fn quotient(high: u64, low: u64, by: u64) -> u64 {
+    let (mut remainder, mut digits) = (high, low);
+    for _ in 0..rolled(u64::BITS) {
+        let next = remainder << 1 | digits >> 63;
+        let is_one = next >= by;
+        remainder = if is_one { next - by } else { next };
+        digits = digits << 1 | u64::from(is_one);
     }
-    (upper << 32) + lower + u64::from(remainder >= by)
+    digits
 }
 
 /// a·b/2³² for b ≤ 2³².
@@ -679,6 +677,10 @@ mod tests {
             ("entry feed [mm/s]", 1e300)
         );
         assert_eq!(refusal(Ramp { t2_s: 1e6, ..good }, 1e-2), ("feed · hold time [mm]", 1e7));
+        // A pulse without edges, and one that is too long for its edges.
+        let rise = Ramp { to_mm_s: 11.0, peak_jerk_mm_s3: 1e3, t1_s: 0.05, t2_s: 0.05, ..good };
+        assert_eq!(refusal(rise, 5e-4), ("t1 / edges", f64::INFINITY));
+        assert_eq!(refusal(Ramp { edge_s: 5e-301, ..rise }, 5e-4), ("t1 / edges", 5e298));
         let step = Ramp { to_mm_s: 11.0, ..good };
         let error = FeedSegment::<f32>::new(&step, length, 5e-4);
         assert_eq!(error, Err(SegmentError::FeedStep { from_mm_s: 10.0, to_mm_s: 11.0 }));

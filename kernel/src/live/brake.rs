@@ -256,4 +256,27 @@ mod tests {
         }
         assert_eq!(rest(&ahead, 100.0), None, "the junction");
     }
+
+    /// Ceilings just before and behind the place where a stop comes down to them: what bounds in f32 leave open is
+    /// decided exactly.
+    #[test]
+    fn a_ceiling_is_kept_to_the_last_places() {
+        let ramp = Ramp::new(&Law::new(Pulse::Plateau, HARD).expect("limits"), FEED_MM_S, 0.0);
+        let (mut kept, mut refused) = (0, 0);
+        for part in 1..100 {
+            let cap_mm_s = FEED_MM_S * f64::from(part) / 100.0;
+            let there_mm = ramp.length_mm() - ramp.reversed().length_to_feed_mm(cap_mm_s);
+            for off_mm in [1e-2, 1e-4, 1e-6] {
+                for (begin_mm, is_kept) in [(there_mm + off_mm, true), (there_mm - off_mm, false)] {
+                    // The ramp begins at 1 mm.
+                    let blocks = [(1.0 + begin_mm, HARD, FEED_MM_S), (100.0, HARD, cap_mm_s)];
+                    let from = Splice { stretch: 0, at: at(1.0), feed_mm_s: FEED_MM_S };
+                    let found = ahead(&blocks).brake(&from, 0.0, at(100.0), 1.0);
+                    assert_eq!(found.is_some(), is_kept, "{cap_mm_s} mm/s, {off_mm} mm");
+                    if is_kept { kept += 1 } else { refused += 1 }
+                }
+            }
+        }
+        assert_eq!((kept, refused), (297, 297));
+    }
 }

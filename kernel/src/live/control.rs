@@ -7,7 +7,7 @@ use super::mode::{Blocks, Mode, Request, Run};
 use super::places::Takeover;
 use super::reader::Reader;
 use super::splice::{BlockEnd, Extent};
-use super::timeline::{Handing, Leads, Timeline};
+use super::timeline::{HandOver, Leads, Timeline};
 use crate::hal::OutputState;
 use crate::law::Pulse;
 use crate::num::Real;
@@ -186,7 +186,7 @@ where
     }
 
     /// [`LiveControl::poll`], which is cut short where `is_stop_asked` says that a hold or an abort waits to be told, or
-    /// where a fault asks for a stop: a plan under way is given up, and the rest of the poll is left to the next one.
+    /// where a fault asks for a stop: the plan or the list under way is given up, and the rest of the poll is left to the next one.
     /// Motion goes on as handed over, or into the stop at the end of its list: a next list may have been taken back.
     /// `is_stop_asked` is called often, so it should only look.
     ///
@@ -319,7 +319,7 @@ where
         }
         let block_end = chooser.block_end;
         let acted = self.act(choice, list, (!is_stop).then_some(is_stop_asked), feeder);
-        if let Ok(Handing::GivenUp) = acted {
+        if let Ok(HandOver::GivenUp) = acted {
             self.reader.feed_mut().roll_back();
             return Ok(false);
         }
@@ -339,11 +339,11 @@ where
         mut list: List,
         unless: Option<&dyn Fn() -> bool>,
         feeder: &mut LiveFeeder<'_, R, AXES>,
-    ) -> Result<Handing, SupplyError<E>> {
+    ) -> Result<HandOver, SupplyError<E>> {
         let Self { reader, timeline, .. } = self;
         let exit = timeline.list().exit();
         let (takeover, feed_override) = match choice {
-            Choice::Nothing => return Ok(Handing::Done),
+            Choice::Nothing => return Ok(HandOver::Done),
             Choice::Follow { feed_override } => (Takeover::After(exit), feed_override),
             Choice::TakeOver { takeover, feed_override } => (takeover, feed_override),
             Choice::Rest { after, ends_block } => {
@@ -353,18 +353,18 @@ where
             }
             Choice::EndBlock => {
                 timeline.end_block();
-                return Ok(Handing::Done);
+                return Ok(HandOver::Done);
             }
-            Choice::DriveToEnd if !timeline.drive_to_end() => return Ok(Handing::Done),
+            Choice::DriveToEnd if !timeline.drive_to_end() => return Ok(HandOver::Done),
             Choice::DriveToEnd | Choice::Replan => {
                 reader.feed_mut().replan_from(timeline.splice().stretch);
-                return Ok(Handing::Done);
+                return Ok(HandOver::Done);
             }
         };
-        let handing =
+        let handed_over =
             timeline.hand_over(list, takeover, feed_override, reader.lookahead(), unless, feeder)?;
-        if handing == Handing::GivenUp {
-            return Ok(handing);
+        if handed_over == HandOver::GivenUp {
+            return Ok(handed_over);
         }
         let (feed, stretch) = (reader.feed_mut(), timeline.splice().stretch);
         let is_planned_anew = matches!(choice, Choice::TakeOver { .. });
@@ -375,7 +375,7 @@ where
         if is_planned_anew {
             feed.replan_from(stretch);
         }
-        Ok(Handing::Done)
+        Ok(HandOver::Done)
     }
 
     /// If data came too late, motion is in a fallback stop: the next list begins at its end. A stop at the

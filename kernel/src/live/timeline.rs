@@ -22,9 +22,10 @@ const LEAD_TICKS_MAX: u64 = 64;
 
 /// How handing a list over ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Handing {
+pub(super) enum HandOver {
+    /// The tick has it.
     Done,
-    /// For a stop that was asked for.
+    /// It was given up for a stop: the tick has what it had.
     GivenUp,
 }
 
@@ -274,8 +275,8 @@ impl Timeline {
     }
 
     /// Hands over a list whose motion is under `feed_override`, and asks the tick to change to it. There must
-    /// be a free feed list. The next list begins at its exit. `unless` says whether a stop is asked for: then, and
-    /// where a fault asks for one, nothing is handed over and nothing changed.
+    /// be a free feed list. The next list begins at its exit. Where there is another free one for it, a stop that is asked
+    /// for, which `unless` says, or that a fault asks for comes first: the list is given up, and all is as before.
     pub(super) fn hand_over<R: Real, E, const AXES: usize, const PLACES: usize>(
         &mut self,
         list: List,
@@ -284,7 +285,7 @@ impl Timeline {
         lookahead: &Lookahead<PLACES>,
         unless: Option<&dyn Fn() -> bool>,
         feeder: &mut LiveFeeder<'_, R, AXES>,
-    ) -> Result<Handing, SupplyError<E>> {
+    ) -> Result<HandOver, SupplyError<E>> {
         let (from, before) = (R::from_f64(list.start().feed_mm_s), self.density_before(takeover));
         let id = feeder.begin(list.start().at, from, before);
         let id = id.ok_or(SupplyError::Rejected(Rejection::full("feed lists", LISTS.into())))?;
@@ -294,19 +295,21 @@ impl Timeline {
             after: takeover.driven() as u32,
             within: matches!(takeover, Takeover::Within(_)),
         };
-        let handing = match self.fill(&list, id, lookahead, unless, feeder) {
-            Ok(Handing::Done) => feeder.change(change).map(|()| Handing::Done).map_err(SupplyError::Rejected),
+        let handed_over = match self.fill(&list, id, lookahead, unless, feeder) {
+            Ok(HandOver::Done) => {
+                feeder.change(change).map(|()| HandOver::Done).map_err(SupplyError::Rejected)
+            }
             filled => filled,
         };
-        if !matches!(handing, Ok(Handing::Done)) {
+        if !matches!(handed_over, Ok(HandOver::Done)) {
             feeder.give_up(id);
-            return handing;
+            return handed_over;
         }
         self.splice = list.exit_splice();
         let before_override = core::mem::replace(&mut self.driven_override, feed_override);
         let handed = Handed { id, list, before };
         self.next = Some(Next { handed, request: None, before_override });
-        handing
+        handed_over
     }
 
     fn fill<R: Real, E, const AXES: usize, const PLACES: usize>(
@@ -316,11 +319,14 @@ impl Timeline {
         lookahead: &Lookahead<PLACES>,
         unless: Option<&dyn Fn() -> bool>,
         feeder: &mut LiveFeeder<'_, R, AXES>,
-    ) -> Result<Handing, SupplyError<E>> {
+    ) -> Result<HandOver, SupplyError<E>> {
         let mut has_room = !list.is_overfull();
         for (start, item) in list.placed() {
-            if unless.is_some_and(|is_stop_asked| is_stop_asked() || feeder.is_stop_wanted()) {
-                return Ok(Handing::GivenUp);
+            let is_stop_wanted =
+                unless.is_some_and(|is_stop_asked| is_stop_asked() || feeder.is_stop_wanted());
+            // The tick empties a list that is given up, which takes some ticks.
+            if is_stop_wanted && feeder.has_free_list() {
+                return Ok(HandOver::GivenUp);
             }
             let is_taken = match item.ready(self.tick_s).map_err(SupplyError::Segment)? {
                 FeedItem::Segment(segment) => is_taken(feeder.segment(id, segment)),
@@ -339,7 +345,7 @@ impl Timeline {
             }
         }
         if has_room {
-            Ok(Handing::Done)
+            Ok(HandOver::Done)
         } else {
             Err(SupplyError::Rejected(Rejection::full("items of a feed list", LIST_ITEMS)))
         }

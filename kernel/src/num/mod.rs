@@ -163,8 +163,8 @@ pub trait Root: Real + Div<Output = Self> {
     /// The shortest length of a block that has any \[mm\].
     const LENGTH_MIN_MM: f64;
 
-    /// A time or a curvature a little greater, so that rounding never makes it too small; in floats it is the
-    /// same, whose rounding is a part of the value.
+    /// A little greater, for what rounding must never make too small; in floats it is the same, whose rounding is
+    /// a part of the value.
     #[must_use]
     fn rounded_up(self) -> Self;
     /// Square root; `self` ≥ 0.

@@ -1,6 +1,7 @@
 //! Whether something more urgent waits than the plan that is being made.
 //!
-//! Long plans ask between their steps and are given up where it does. No step takes longer than a ramp and what it passes.
+//! Long plans ask between their steps and are given up where it does. A step is a ramp and what it passes, the feeds of one
+//! block, what becomes of one ceiling, or an item of a list.
 
 use core::cell::Cell;
 

@@ -118,10 +118,12 @@ pub(crate) fn instructions_of_a_tick(tools: &Tools) -> Result<(), String> {
         let [programs, _] = programs::worst_live_ticks();
         let answers = by_name(&tools.count(board, "answers", &programs)?);
         for (what, name) in [
-            ("the poll that takes a hold", "hold"),
+            ("a hold, until it is obeyed", "hold"),
             ("the poll that takes an override", "override"),
             ("the poll that takes a resume", "resume"),
+            ("the poll that begins or ends single block", "single_block"),
             ("the longest step of a poll between two looks for a stop", "step"),
+            ("the rest of a poll that is told of a stop", "given_up"),
         ] {
             row(&mut stages, board, what, &answers[name]);
         }

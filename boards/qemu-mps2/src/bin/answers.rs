@@ -1,6 +1,7 @@
 //! Counts the instructions of the polls in which the background answers a command, of every program of the bundle: holds,
-//! resumes and overrides, at random moments of all kinds of motion; and of the longest step of every poll, after which it
-//! looks whether a stop is asked for. Encoders read what was set in the tick before.
+//! resumes, overrides and single block, at random moments of all kinds of motion; of the longest step of every poll, after
+//! which it looks whether a stop is asked for; and of what it does where that look says yes. Encoders read what was set in
+//! the tick before.
 //!
 //! One line a figure, as `budget` prints them.
 #![no_std]
@@ -12,6 +13,7 @@ use hal_sim::closed_loop::InMemory;
 use motion_kernel::axis::AxesConfig;
 use motion_kernel::kernel::Kernel;
 use motion_kernel::live::{Leads, LiveControl, State};
+use motion_kernel::num::Scalar;
 use motion_kernel::program::Reader;
 use motion_kernel::units::{Counts, DacCode};
 use qemu_boards::count::Counter;
@@ -53,17 +55,31 @@ fn run(seed: u32, bytes: &[u8], counter: &Counter) {
         LiveControl::<_, AXES, _, _, PLACES>::new(program.items(), header.pulse, header.tick_s, Leads::NONE);
     // The first poll reads as much of the program as there is room for: no command is answered by that.
     let (mut random, mut wait) = (u64::from(seed), 1);
+    let (mut is_single, mut is_stop_due, mut is_moving) = (false, false, false);
     for _ in 0..TICKS_MAX {
         let mut kind = None;
-        if wait == 0 {
+        // The look that is told of a stop.
+        let mut told = None;
+        // At rest there is nothing to answer.
+        let hold = is_moving.then_some("hold");
+        if is_stop_due {
+            control.hold();
+            (kind, is_stop_due) = (hold, false);
+        } else if wait == 0 {
             // Knuth's generator of full period; its upper bits.
             random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             let bits = random >> 20;
             wait = 5 + bits % 300;
+            told = (bits >> 36 & 1 == 0).then_some(1 + (bits >> 24 & 127) as u32);
             kind = match control.state(&feeder) {
                 State::Held => {
                     control.resume();
                     Some("resume")
+                }
+                State::Running if is_single || bits >> 40 & 15 == 0 => {
+                    is_single = !is_single;
+                    control.set_single_block(is_single);
+                    Some("single_block")
                 }
                 State::Running if bits >> 40 & 3 == 0 => {
                     control.set_override(0.125 * (1 + (bits >> 32 & 15)) as f64).unwrap_or_default();
@@ -71,33 +87,43 @@ fn run(seed: u32, bytes: &[u8], counter: &Counter) {
                 }
                 State::Running => {
                     control.hold();
-                    Some("hold")
+                    hold
                 }
                 _ => None,
             };
         }
-        wait -= 1;
+        wait = wait.saturating_sub(1);
         // In steps of the timer.
         let (since, longest, whole) = (Cell::new(now()), Cell::new(0), Cell::new(0));
         // A stop is handed over without a look, and before more of the program is read, which has many.
         let first = Cell::new(None);
+        let (looks, after) = (Cell::new(0), Cell::new(None));
         let look = || {
             let at = now();
             let step = at.wrapping_sub(since.replace(at)) & WRAP;
             longest.set(step.max(longest.get()));
             whole.set(whole.get() + u64::from(step));
             first.set(first.get().or(Some(step)));
-            false
+            looks.set(looks.get() + 1);
+            after.set(after.get().map(|after: u64| after + u64::from(step)));
+            if kind != Some("hold") && told == Some(looks.get()) {
+                after.set(Some(0));
+            }
+            after.get().is_some()
         };
         let polled = control.poll_unless(&look, &mut feeder);
         look();
         polled.unwrap_or_else(|error| fail(&error));
         println!("step {}", counter.instructions(longest.get().into()));
-        if let Some(kind) = kind {
+        if let Some(after) = after.get() {
+            println!("given_up {}", counter.instructions(after));
+            is_stop_due = control.state(&feeder) == State::Running;
+        } else if let Some(kind) = kind {
             let answer = if kind == "hold" { first.get().unwrap_or(0).into() } else { whole.get() };
             println!("{} {}", kind, counter.instructions(answer));
         }
         let trace = kernel.tick(&mut intake, &mut memory);
+        is_moving = trace.executed.motion.v_mm_s > Number::ZERO;
         if trace.fault.is_some() {
             fail(&"a fault");
         }

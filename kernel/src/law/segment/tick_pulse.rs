@@ -116,11 +116,11 @@ impl<R: Real> TickPulse<R> {
         let arch_s = edge_s + edge_s;
         let arches = pulse_s / arch_s;
         // A pulse may be shorter than its edges by rounding.
-        let steps = if arches > 1.0 { in_q32(arches) } else { ONE as f64 };
-        if !is_within(steps, 0.0, MOST_ARCHES * ONE as f64) {
+        let is_held = is_within(arches, 0.0, MOST_ARCHES);
+        if !is_held {
             refused.get_or_insert(SegmentError::OutOfRange { quantity: "t1 / edges", value: arches });
         }
-        let steps = if is_within(steps, 0.0, MOST_ARCHES * ONE as f64) { steps } else { ONE as f64 };
+        let steps = if is_held && arches > 1.0 { in_q32(arches) } else { ONE as f64 };
         let arches = whole(steps);
         let arches_low = whole(in_q32(steps - arches as f64));
         let edge = if arches > ONE { whole(in_q32(in_q32(ONE as f64 / (steps + steps)))) } else { 1 << 63 };

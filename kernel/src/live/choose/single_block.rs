@@ -116,6 +116,9 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         }
         let stretch = under_way.after(done).stretch;
         let rests = places.clone().filter_map(|place| {
+            if self.attention.is_wanted() {
+                return None;
+            }
             let splice = place.splice(self.tick_s);
             let rest = if splice.is_at_rest() {
                 splice.at
@@ -134,12 +137,18 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
                         return choice;
                     }
                 }
+                if self.attention.is_wanted() {
+                    return Choice::Nothing;
+                }
                 let choice = self.brake_from(places.clone(), list);
                 if choice != Choice::Nothing {
                     return choice;
                 }
             }
             self.block_end = None;
+            if self.attention.is_wanted() {
+                return Choice::Nothing;
+            }
             if ends.iter().any(Option::is_some) {
                 return self.stop(places.clone(), progress, list);
             }
@@ -155,6 +164,9 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
     /// Brakes to the block end from the first place that allows it.
     fn brake_from(&self, places: Places<'_>, list: &mut List) -> Choice {
         for place in places {
+            if self.attention.is_wanted() {
+                break;
+            }
             place.begin(list);
             if list.end().feed_mm_s >= place.start().feed_mm_s
                 && self.brake_at_block_end(list)

@@ -427,8 +427,10 @@ impl<'a> Intervals<'a> {
     /// Approximate time lost \[s\] by resting in `root` on the way from `bound` over `gap` and further, over
     /// `beyond`, towards `other`.
     fn broken(&self, root: &Node, bound: &Node, gap: &Gap, other: &Node, beyond: &Gap, next: u32) -> f64 {
-        let is_needed = next != NONE && !self.attention.is_wanted();
-        let Some(law) = self.law(next).filter(|_| is_needed) else { return 0.0 };
+        if self.attention.is_wanted() {
+            return 0.0;
+        }
+        let Some(law) = self.law(next).filter(|_| next != NONE) else { return 0.0 };
         let feed = root.feed_mm_s;
         let mean_mm_s = beyond.length_mm / beyond.ideal_s;
         if !(mean_mm_s > feed) {

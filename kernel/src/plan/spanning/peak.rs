@@ -113,7 +113,7 @@ impl<'a> Sides<'a> {
         // False position, with bisection where that stalls; aimed a little short, so that there is room.
         for step in 0..PEAK_STEPS {
             let gains = best_s == f64::INFINITY || gap_mm * (high - low) > PEAK_GAIN * best_s * high * low;
-            if gap_mm < PEAK_GAP * room_mm || !gains {
+            if gap_mm < PEAK_GAP * room_mm || !gains || up.is_given_up() {
                 break;
             }
             if 0 < step && step < AIMED_STEPS {

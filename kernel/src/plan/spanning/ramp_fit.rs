@@ -63,6 +63,9 @@ enum Tried {
 impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
     /// The ramp that loses the least time, if that is less than `most_s`.
     pub(super) fn best(&mut self, most_s: f64) -> Option<(AscentRamp, Fit)> {
+        if self.is_given_up() {
+            return None;
+        }
         let mut most_s = most_s;
         // As hard as allowed.
         let hard = self.hardest(self.within);
@@ -79,6 +82,9 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
         // The softest ramp that might lose little enough: a ramp alone loses its time × change/(2·to), and
         // takes no less than change/acceleration. If the hardest one must wait for a step, that step shows
         // how much softer ones lose.
+        if self.is_given_up() {
+            return None;
+        }
         let change = self.to_mm_s - self.from_mm_s;
         let known = best.map_or(hard, |(ramp, _): (AscentRamp, Fit)| ramp.ramp);
         if self.is_hopeless(&known, change * change / (2.0 * self.to_mm_s * most_s), most_s) {
@@ -109,7 +115,8 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
                 break;
             }
         }
-        if good_s == f64::INFINITY && self.is_hopeless(&known, hardest / SOFTER, all_s) {
+        if self.is_given_up() || good_s == f64::INFINITY && self.is_hopeless(&known, hardest / SOFTER, all_s)
+        {
             return best;
         }
         // Golden-section search around the best of them.
@@ -130,6 +137,9 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
 
     /// The ramp with at most this acceleration, if it loses at most `most_s`.
     fn with(&mut self, accel_mm_s2: f64, most_s: f64) -> Tried {
+        if self.is_given_up() {
+            return Tried::TooSoft;
+        }
         let limits = self.softened(accel_mm_s2);
         self.below_steps(self.hardest(limits), limits, most_s)
     }

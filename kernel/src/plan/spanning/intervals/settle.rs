@@ -29,7 +29,7 @@ impl Intervals<'_> {
         while right != NONE {
             // Minima given up one after the other make ever longer intervals.
             looked_at += (right - left) as usize;
-            if looked_at > LOOKS_MAX * self.nodes.len() {
+            if looked_at > LOOKS_MAX * self.nodes.len() || self.attention.is_wanted() {
                 return false;
             }
             let interval = self.interval(left, right);
