@@ -50,7 +50,7 @@ pub(super) fn cbrtf(x: f32) -> f32 {
         root = root + root * ((quotient - root) / ((root + root) + quotient));
     }
     if is_subnormal {
-        root = root * (1.0 / SCALE);
+        root *= 1.0 / SCALE;
     }
     root.copysign(x)
 }
