@@ -26,7 +26,7 @@ pub(crate) const BOARD: BoardParameters = BoardParameters {
 
 pub(crate) const TICK_S: f64 = 0.0005;
 
-/// Ticks of a long poll of the background: 33 ms. Only plans for another override take longer.
+/// Ticks of a long poll of the background: 33 ms. Only some plans for another override or after a hold take longer.
 pub(crate) const POLL_TICKS_MAX: u32 = 66;
 
 /// The stringer, 2.320 s long.

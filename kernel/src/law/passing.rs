@@ -142,7 +142,7 @@ mod tests {
     use crate::random::Random;
 
     /// Ramps of all regimes and sizes, from rest too, and such that are longer than their law asks for, as when one is
-    /// driven on to rest: what the bounds allow for rounding is needed to a half, and is enough.
+    /// driven on to rest: what the bounds allow for rounding is needed to a quarter, and is enough.
     #[test]
     fn bounds_allow_for_rounding() {
         let random = Random::new(21);

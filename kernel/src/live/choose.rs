@@ -98,8 +98,8 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
         }
         self.feed.roll_back();
         // At rest with no room for more path: the program's own feed needs more path to stop than there will
-        // be.
-        if self.is_full && splice.is_at_rest() {
+        // be. What was given up tells nothing.
+        if self.is_full && splice.is_at_rest() && !self.attention.is_wanted() {
             self.feed.replan_from(splice.stretch);
         }
         Choice::Nothing

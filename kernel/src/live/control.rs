@@ -186,8 +186,8 @@ where
     }
 
     /// [`LiveControl::poll`], which is cut short where `is_stop_asked` says that a hold or an abort waits to be told, or
-    /// where a fault asks for a stop: the plan or the list under way is given up, and the rest of the poll is left to the next one.
-    /// Motion goes on as handed over, or into the stop at the end of its list: a next list may have been taken back.
+    /// where a fault asks for a stop: the plan or the list that is being made is given up, and the rest of the poll is left to
+    /// the next one. Motion goes on as handed over, or into the stop at the end of its list: a next list may have been taken back.
     /// `is_stop_asked` is called often, so it should only look.
     ///
     /// # Errors

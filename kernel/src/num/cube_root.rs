@@ -3,7 +3,7 @@
 //! A third of the exponent and a straight line through the digits come within 3.3 % of the root. Two steps of
 //! Halley's in f32, each of which cubes the error, leave only the rounding of f32. A third one in f64 leaves that
 //! of f64. A core without f64 pays for nine operations in software; the correctly rounded root of `libm` takes
-//! fused products, which it has not either (docs/decisions/46-answers.md).
+//! fused products, which it lacks, too (docs/decisions/46-answers.md).
 
 /// The cube root, within 0.67 of a last place. 0 and what is not finite is returned.
 #[inline(never)]

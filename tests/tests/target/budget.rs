@@ -118,7 +118,7 @@ pub(crate) fn instructions_of_a_tick(tools: &Tools) -> Result<(), String> {
         let [programs, _] = programs::worst_live_ticks();
         let answers = by_name(&tools.count(board, "answers", &programs)?);
         for (what, name) in [
-            ("a hold, until it is obeyed", "hold"),
+            ("the first step of a poll that takes a hold", "hold"),
             ("the poll that takes an override", "override"),
             ("the poll that takes a resume", "resume"),
             ("the poll that begins or ends single block", "single_block"),

@@ -1,7 +1,7 @@
 //! Counts the instructions of the polls in which the background answers a command, of every program of the bundle: holds,
 //! resumes, overrides and single block, at random moments of all kinds of motion; of the longest step of every poll, after
-//! which it looks whether a stop is asked for; and of what it does where that look says yes. Encoders read what was set in
-//! the tick before.
+//! which it looks whether a stop is asked for; and of what it does where that look says yes, in every other run. Encoders
+//! read what was set in the tick before.
 //!
 //! One line a figure, as `budget` prints them.
 #![no_std]
@@ -70,7 +70,9 @@ fn run(seed: u32, bytes: &[u8], counter: &Counter) {
             random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             let bits = random >> 20;
             wait = 5 + bits % 300;
-            told = (bits >> 36 & 1 == 0).then_some(1 + (bits >> 24 & 127) as u32);
+            // Of few looks or many.
+            let within = (1 << (bits >> 24 & 15)) - 1;
+            told = (seed % 2 == 1).then_some(1 + (bits >> 28 & within) as u32);
             kind = match control.state(&feeder) {
                 State::Held => {
                     control.resume();
@@ -112,13 +114,14 @@ fn run(seed: u32, bytes: &[u8], counter: &Counter) {
             after.get().is_some()
         };
         let polled = control.poll_unless(&look, &mut feeder);
+        let is_given_up = after.get().is_some();
         look();
         polled.unwrap_or_else(|error| fail(&error));
         println!("step {}", counter.instructions(longest.get().into()));
-        if let Some(after) = after.get() {
-            println!("given_up {}", counter.instructions(after));
+        if is_given_up {
+            println!("given_up {}", counter.instructions(after.get().unwrap_or(0)));
             is_stop_due = control.state(&feeder) == State::Running;
-        } else if let Some(kind) = kind {
+        } else if let Some(kind) = kind.filter(|kind| told.is_none() || *kind == "hold") {
             let answer = if kind == "hold" { first.get().unwrap_or(0).into() } else { whole.get() };
             println!("{} {}", kind, counter.instructions(answer));
         }

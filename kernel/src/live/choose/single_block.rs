@@ -89,6 +89,9 @@ impl<const PLACES: usize> Chooser<'_, PLACES> {
                 if self.gather_under_override(list, true, ramps) {
                     return true;
                 }
+                if self.attention.is_wanted() {
+                    return false;
+                }
                 list.truncate(0);
                 if self.brake_at_block_end(list) {
                     return true;

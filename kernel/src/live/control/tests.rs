@@ -277,3 +277,49 @@ fn a_plan_is_given_up_for_a_stop() {
         step += 1;
     }
 }
+
+/// With no room for more path, a list from rest that is given up is made again from the program's own feed, wherever
+/// the stop is asked for.
+#[test]
+fn what_is_given_up_at_rest_is_the_programs_own_feed_again() {
+    let up = Ramp::new(&Law::new(Pulse::Plateau, LIMITS).expect("limits"), 0.0, 20.0);
+    let (ramp, cruise) = (at(up.length_mm()), at(100.0));
+    let whole = ramp + cruise + ramp;
+    let allowed = Allowed { cap_mm_s: 20.0, limits: LIMITS };
+    let feed = |ramp, length| Item::Feed(PlannedRamp { ramp, length });
+    let mut items = vec![
+        Item::Block(PathBlock::new(whole, 20.0, allowed, allowed, 0.0)),
+        feed(up, ramp),
+        feed(Ramp::cruise(20.0, 5.0), cruise),
+        feed(up.reversed(), ramp),
+    ];
+    // More pieces than the queue has places.
+    let mut start = Position::ZERO;
+    while start < whole {
+        let length = at(4.0).min(whole - start);
+        items.push(Item::Line { line: 1, start: [start], direction: [1.0], length });
+        start = start + length;
+    }
+    items.push(Item::EndOfStretch([whole]));
+    let (mut step, mut given_up) = (1, 0);
+    loop {
+        let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
+        let (mut feeder, _) = streams.split(RULES, [Position::ZERO]);
+        let program = items.clone().into_iter().map(Ok);
+        let mut control =
+            LiveControl::<f64, 1, _, Infallible, 64>::new(program, Pulse::Plateau, TICK_S, Leads::NONE);
+        let asked = core::cell::Cell::new(0);
+        let is_asked = || {
+            asked.set(asked.get() + 1);
+            asked.get() >= step
+        };
+        control.poll_unless(&is_asked, &mut feeder).expect("executable");
+        assert!(!control.reader.feed_mut().replans(0), "asked at look {step}");
+        if control.timeline.has_next() {
+            break;
+        }
+        given_up += usize::from(control.reader.is_full());
+        step += 1;
+    }
+    assert!(given_up > 0, "never with a full queue: {step}");
+}
