@@ -214,7 +214,8 @@ impl<R: Root> Law<R> {
         let rise_s = rise_s.rounded_up();
         let (edge_s, rise_s) = match (self.pulse, limited_by) {
             (Pulse::Sin2, _) | (Pulse::Plateau, LimitedBy::Snap) => {
-                (rise_s.half(), rise_s.half() + rise_s.half())
+                let edge_s = rise_s.half();
+                (edge_s, edge_s + edge_s)
             }
             (Pulse::Plateau, _) => (self.snap_time_s.rounded_up().half().min(rise_s.half()), rise_s),
         };

@@ -157,11 +157,6 @@ impl<'a> Ascent<'a> {
         self.attention = Some(attention);
     }
 
-    /// Whether something more urgent waits.
-    pub(super) fn is_given_up(&self) -> bool {
-        self.attention.is_some_and(Attention::is_wanted)
-    }
-
     /// Begins before `steps` at `from_mm_s`, with `room_mm` for the ascent and ramps of `pulse`s. Steps not
     /// above the start only delay it.
     pub(super) fn start(&mut self, steps: &Steps, from_mm_s: f64, room_mm: f64, pulse: Pulse) {
@@ -186,9 +181,6 @@ impl<'a> Ascent<'a> {
     /// `limits` gives the limits between two positions, always the same for one start. `None` if there is no
     /// chain.
     pub(super) fn find(&mut self, to_mm_s: f64, limits: impl Fn(f64, f64) -> Limits<f64>) -> Option<f64> {
-        if self.is_given_up() {
-            return None;
-        }
         let start = *self.reached.first()?;
         if !(to_mm_s > start.feed_mm_s) {
             self.peak = start;

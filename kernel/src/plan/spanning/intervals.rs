@@ -109,7 +109,7 @@ pub(super) struct Intervals<'a> {
     accel_mm_s2: f64,
     pulse: Pulse,
     /// What all of it is given up for.
-    attention: &'a Attention<'a>,
+    pub(super) attention: &'a Attention<'a>,
 }
 
 /// A part of the stretch still to be visited: the minima it lies between, and the nodes next to its rest.

@@ -68,17 +68,13 @@ pub(super) fn plan_spanning_unless(
     let (mut up, mut down) = (Ascent::NONE, Ascent::NONE);
     up.attend(attention);
     down.attend(attention);
-    if attention.is_wanted() {
-        return Err(PlanError::GivenUp);
-    }
-    let found = spanned(attention, &mut intervals, &mut up, &mut down, put);
+    let found = spanned(&mut intervals, &mut up, &mut down, put);
     // What was given up looks as if nothing fitted.
     if attention.is_wanted() { Err(PlanError::GivenUp) } else { Ok(found) }
 }
 
 /// The time of the ramps over all intervals \[s\].
 fn spanned(
-    attention: &Attention<'_>,
     intervals: &mut Intervals<'_>,
     up: &mut Ascent<'_>,
     down: &mut Ascent<'_>,
@@ -87,7 +83,7 @@ fn spanned(
     if !intervals.settle(|intervals, interval| lowest_fits(interval, intervals, up, down)) {
         return None;
     }
-    let mut out = Out { attention, at_mm: 0.0, time_s: 0.0, put };
+    let mut out = Out { attention: intervals.attention, at_mm: 0.0, time_s: 0.0, put };
     for interval in intervals.in_order() {
         out.cruise(interval.start_mm, interval.enter_mm_s);
         drive(&interval, intervals, up, down, &mut out)?;

@@ -83,8 +83,11 @@ impl<'a> Sides<'a> {
     }
 
     /// Plans both sides up to `peak`; returns the length left between them \[mm\], negative if there is no
-    /// room. `None` if there is no room even for one side alone.
+    /// room. `None` if there is no room even for one side alone, or something more urgent waits.
     pub(super) fn fit(&self, peak: f64, up: &mut Ascent<'_>, down: &mut Ascent<'_>) -> Option<f64> {
+        if self.intervals.attention.is_wanted() {
+            return None;
+        }
         let (start_mm, end_mm) = (self.interval.start_mm, self.interval.end_mm);
         let up_mm = up.find(peak, |a, b| self.limits(start_mm + a, start_mm + b, false))?;
         let down_mm = down.find(peak, |a, b| self.limits(end_mm - b, end_mm - a, true))?;
@@ -113,7 +116,7 @@ impl<'a> Sides<'a> {
         // False position, with bisection where that stalls; aimed a little short, so that there is room.
         for step in 0..PEAK_STEPS {
             let gains = best_s == f64::INFINITY || gap_mm * (high - low) > PEAK_GAIN * best_s * high * low;
-            if gap_mm < PEAK_GAP * room_mm || !gains || up.is_given_up() {
+            if gap_mm < PEAK_GAP * room_mm || !gains || self.intervals.attention.is_wanted() {
                 break;
             }
             if 0 < step && step < AIMED_STEPS {

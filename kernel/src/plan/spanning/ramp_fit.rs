@@ -82,9 +82,6 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
         // The softest ramp that might lose little enough: a ramp alone loses its time × change/(2·to), and
         // takes no less than change/acceleration. If the hardest one must wait for a step, that step shows
         // how much softer ones lose.
-        if self.is_given_up() {
-            return None;
-        }
         let change = self.to_mm_s - self.from_mm_s;
         let known = best.map_or(hard, |(ramp, _): (AscentRamp, Fit)| ramp.ramp);
         if self.is_hopeless(&known, change * change / (2.0 * self.to_mm_s * most_s), most_s) {
@@ -115,8 +112,7 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
                 break;
             }
         }
-        if self.is_given_up() || good_s == f64::INFINITY && self.is_hopeless(&known, hardest / SOFTER, all_s)
-        {
+        if good_s == f64::INFINITY && self.is_hopeless(&known, hardest / SOFTER, all_s) {
             return best;
         }
         // Golden-section search around the best of them.
