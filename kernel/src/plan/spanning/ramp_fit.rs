@@ -79,6 +79,9 @@ impl<L: Fn(f64, f64) -> Limits<f64>> RampFit<'_, L> {
             Tried::TooSoft => return None,
             Tried::TooHard => {}
         }
+        if self.is_given_up() {
+            return None;
+        }
         // The softest ramp that might lose little enough: a ramp alone loses its time × change/(2·to), and
         // takes no less than change/acceleration. If the hardest one must wait for a step, that step shows
         // how much softer ones lose.
