@@ -282,17 +282,11 @@ fn a_plan_is_given_up_for_a_stop() {
 /// the stop is asked for.
 #[test]
 fn what_is_given_up_at_rest_is_the_programs_own_feed_again() {
-    let up = Ramp::new(&Law::new(Pulse::Plateau, LIMITS).expect("limits"), 0.0, 20.0);
-    let (ramp, cruise) = (at(up.length_mm()), at(100.0));
-    let whole = ramp + cruise + ramp;
-    let allowed = Allowed { cap_mm_s: 20.0, limits: LIMITS };
-    let feed = |ramp, length| Item::Feed(PlannedRamp { ramp, length });
-    let mut items = vec![
-        Item::Block(PathBlock::new(whole, 20.0, allowed, allowed, 0.0)),
-        feed(up, ramp),
-        feed(Ramp::cruise(20.0, 5.0), cruise),
-        feed(up.reversed(), ramp),
-    ];
+    let [block, Item::Line { length: whole, .. }, feed @ .., end] = line(Position::ZERO) else {
+        panic!("a block and its line");
+    };
+    let mut items = vec![block];
+    items.extend(feed);
     // More pieces than the queue has places.
     let mut start = Position::ZERO;
     while start < whole {
@@ -300,7 +294,7 @@ fn what_is_given_up_at_rest_is_the_programs_own_feed_again() {
         items.push(Item::Line { line: 1, start: [start], direction: [1.0], length });
         start = start + length;
     }
-    items.push(Item::EndOfStretch([whole]));
+    items.push(end);
     let (mut step, mut given_up) = (1, 0);
     loop {
         let mut streams = LiveStreams::<f64, 1, 8, 16>::new();
