@@ -34,6 +34,7 @@ pub mod uart;
 
 use ::core::panic::PanicInfo;
 
+use armv7m_double as _;
 use semihosting::process;
 
 /// The kernel's number type on this core.

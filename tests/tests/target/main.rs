@@ -14,6 +14,7 @@
 mod budget;
 mod cycles;
 mod digest;
+mod double;
 mod firmware;
 mod firmware_link;
 mod functions;
@@ -34,7 +35,7 @@ use tools::Tools;
 type Test = fn(&Tools) -> Result<(), String>;
 
 /// Name, whether it holds figures that depend on the compiler, and the test. The longest first: others run beside it.
-const TESTS: [(&str, bool, Test); 17] = [
+const TESTS: [(&str, bool, Test); 19] = [
     ("a_sender_is_killed", false, killed::a_sender_is_killed),
     ("estimated_cycles", true, cycles::estimated_cycles),
     ("the_firmware_runs", false, firmware::the_firmware_runs),
@@ -55,6 +56,8 @@ const TESTS: [(&str, bool, Test); 17] = [
     ("instructions_of_a_tick", true, budget::instructions_of_a_tick),
     ("the_longest_ticks_and_turns", true, search::the_longest_ticks_and_turns),
     ("instructions_of_functions", true, functions::instructions_of_functions),
+    ("the_same_sums_and_products", false, double::the_same_sums_and_products),
+    ("instructions_of_double", true, double::instructions_of_double),
     ("sizes", true, image::sizes),
 ];
 

@@ -1,0 +1,97 @@
+//! Pairs of numbers to try the routines with: far apart and near, of long fractions and short ones, whose sums and products
+//! are half way between two numbers, at the ends of the range, and all that is no normal number.
+
+const FRACTION: u64 = (1 << 52) - 1;
+const SIGN: u64 = 1 << 63;
+/// What rules are made for, as bits without sign: zero, the least number, the greatest subnormal and the least normal one, one, the greatest
+/// number, infinity, what is not a number.
+const SPECIAL: [u64; 8] =
+    [0, 1, FRACTION, FRACTION + 1, 1023 << 52, (0x7FF << 52) - 1, 0x7FF << 52, (0x7FF << 52) + 1];
+
+/// Pairs that emulated cores try.
+pub const PAIRS: usize = 2_000_000;
+
+/// A sequence of pairs, as bits of f64; the same for a seed everywhere.
+#[derive(Clone, Copy, Debug)]
+pub struct Operands(u64);
+
+impl Operands {
+    /// The sequence of a seed.
+    #[must_use]
+    pub const fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    fn bits(&mut self) -> u64 {
+        // Steele, Lea and Flood, "Fast splittable pseudorandom number generators", 2014.
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let x = (self.0 ^ self.0 >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let x = (x ^ x >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+        x ^ x >> 31
+    }
+
+    /// From −`most` to `most`, wrapped.
+    fn small(&mut self, most: u32) -> u64 {
+        u64::from((self.bits() >> 32) as u32 % (2 * most + 1)).wrapping_sub(u64::from(most))
+    }
+}
+
+impl Iterator for Operands {
+    type Item = (u64, u64);
+
+    fn next(&mut self) -> Option<(u64, u64)> {
+        let (kind, a, b) = (self.bits(), self.bits(), self.bits());
+        let exponent = a >> 52 & 0x7FF;
+        let with = |bits: u64, exponent: u64| bits & !(0x7FF << 52) | (exponent & 0x7FF) << 52;
+        // The upper places alone, of some number.
+        let short = |bits: u64, places: u64| bits & !(FRACTION >> (places % 52));
+        let special = |which: u64| SPECIAL[(which & 7) as usize] | which << 60 & SIGN;
+        let near = exponent.wrapping_add(self.small(70));
+        let pair = match kind & 15 {
+            0 => (a, b),
+            1 | 2 => (a, with(b, near)),
+            3 => (a, with(b, exponent.wrapping_add(self.small(2)))),
+            4 => (a, a ^ b & SIGN ^ b >> 1 >> (kind >> 8 & 63) & FRACTION),
+            5 | 6 => (short(a, kind >> 8), with(short(b, kind >> 16), near)),
+            7 => (short(a, kind >> 8), with(b, near)),
+            // Sums of small numbers and of great ones.
+            8 => (with(a, kind >> 8 & 63), with(b, kind >> 16 & 63)),
+            9 => (with(a, 2046 - (kind >> 8 & 3)), with(b, 2046 - (kind >> 16 & 63))),
+            // Products and quotients at the ends of the range.
+            10 => (a, with(b, 1023_u64.wrapping_sub(exponent).wrapping_add(self.small(60)))),
+            11 => (a, with(b, 3069_u64.wrapping_sub(exponent).wrapping_add(self.small(3)))),
+            12 => (a, with(b, exponent.wrapping_add(1022).wrapping_add(self.small(60)))),
+            13 => (a, special(kind >> 8)),
+            14 => (special(kind >> 8), b),
+            _ => (special(kind >> 8), special(kind >> 16)),
+        };
+        Some(pair)
+    }
+}
+
+/// A digest of results, in which what is not a number is all one.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Results(u64);
+
+impl Results {
+    /// Those of a pair: sum, difference, product and quotient; and whether the first is less, at most, more, at least the second.
+    pub fn take(&mut self, sum: f64, difference: f64, product: f64, quotient: f64, order: [bool; 4]) {
+        for result in [sum, difference, product, quotient] {
+            // By its bits: to compare is what is tried.
+            let bits = result.to_bits();
+            self.add(if bits & !SIGN > 0x7FF << 52 { 0x7FF << 52 | 1 } else { bits });
+        }
+        self.add(order.into_iter().fold(0, |bits, is_so| bits << 1 | u64::from(is_so)));
+    }
+
+    fn add(&mut self, bits: u64) {
+        // FNV-1a, by words.
+        self.0 = (self.0 ^ bits).wrapping_mul(0x0000_0100_0000_01B3).rotate_left(29);
+    }
+
+    /// The digest of all so far.
+    #[must_use]
+    pub fn digest(&self) -> u64 {
+        self.0
+    }
+}

@@ -1,0 +1,55 @@
+//! Arithmetic of f64: on every core the bits of a PC, and its instructions.
+
+use armv7m_double::operands::{Operands, PAIRS, Results};
+use motion_tests::figures::{Table, hold};
+
+use crate::budget::{GROWTH, by_name};
+use crate::tools::{BOARDS, Board, Clock, M7, Tools};
+
+/// Every ten thousandth digest.
+fn on_the_pc() -> Vec<String> {
+    let mut results = Results::default();
+    let pairs = Operands::new(2).take(PAIRS).map(|(a, b)| (f64::from_bits(a), f64::from_bits(b)));
+    let mut digests = Vec::new();
+    for (number, (x, y)) in (1..).zip(pairs) {
+        results.take(x + y, x - y, x * y, x / y, [x < y, x <= y, x > y, x >= y]);
+        if number % 10_000 == 0 {
+            digests.push(format!("{:016x}", results.digest()));
+        }
+    }
+    digests
+}
+
+fn printed(tools: &Tools, board: Board) -> Result<String, String> {
+    tools.run(board, "double", &[], Clock::Counting)
+}
+
+pub(crate) fn the_same_sums_and_products(tools: &Tools) -> Result<(), String> {
+    let expected = on_the_pc();
+    for board in BOARDS {
+        let printed = printed(tools, board)?;
+        let found: Vec<_> = printed.lines().filter_map(|line| line.strip_prefix("digest ")).collect();
+        if found != expected {
+            let right = found.iter().zip(&expected).take_while(|(found, expected)| found == expected).count();
+            return Err(format!(
+                "{}: another result among the ten thousand pairs from {right}0000 on",
+                board.core
+            ));
+        }
+    }
+    Ok(())
+}
+
+pub(crate) fn instructions_of_double(tools: &Tools) -> Result<(), String> {
+    let mut table = Table::new(&["core", "instructions of", "min", "median", "max"]);
+    for board in BOARDS.into_iter().filter(|&board| board != M7) {
+        let figures = by_name(&printed(tools, board)?);
+        for name in ["sum", "difference", "product", "quotient", "comparison"] {
+            let sorted = figures.get(name).ok_or_else(|| format!("{}: no {name}", board.core))?;
+            let figures = [sorted[0], sorted[sorted.len() / 2], sorted[sorted.len() - 1]];
+            let [least, median, most] = figures.map(|figure| figure.to_string());
+            table.row(&[board.core, &format!("a {name}"), &least, &median, &most]);
+        }
+    }
+    hold("double", &table, GROWTH)
+}
