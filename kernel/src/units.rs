@@ -15,7 +15,7 @@
 use fixed::types::I32F32;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::num::{Real, in_q32, is_within, of_q32};
+use crate::num::{Real, of_q32};
 
 const STEPS_PER_MM: f64 = 4_294_967_296.0;
 
@@ -59,15 +59,23 @@ impl Position {
     #[must_use]
     #[inline(never)]
     pub fn from_mm(mm: f64) -> Option<Self> {
-        if !is_within(mm, -Self::LIMIT_MM, Self::LIMIT_MM) {
+        const FRACTION_BITS: u32 = f64::MANTISSA_DIGITS - 1;
+        // By its digits: on a core without f64 a comparison, a product and a sum are subroutines.
+        let bits = mm.to_bits();
+        let magnitude = bits & (u64::MAX >> 1);
+        if magnitude > Self::LIMIT_MM.to_bits() {
             return None;
         }
-        // Below 2⁵² steps. With 2⁵² on top the float's last place is a step: the sum is rounded to it, halves
-        // to even, and its lower bits are the number of steps.
-        const STEP_IS_LAST: f64 = 4_503_599_627_370_496.0;
-        let steps = in_q32(libm::fabs(mm)) + STEP_IS_LAST;
-        let steps = (steps.to_bits() - STEP_IS_LAST.to_bits()).cast_signed();
-        Some(Self::from_bits(if mm.is_sign_negative() { -steps } else { steps }))
+        // Twice the last digit is `lost` places below a step; of what is subnormal nothing remains anyway.
+        let digits = magnitude & ((1 << FRACTION_BITS) - 1) | 1 << FRACTION_BITS;
+        let lost = (1023 + FRACTION_BITS - 32 - 1) - (magnitude >> FRACTION_BITS) as u32;
+        let doubled = digits.checked_shr(lost).unwrap_or(0);
+        // To the nearest step, halves to even: half a step is the lowest digit left, if all that was lost is 0.
+        let is_more = digits.checked_shl(u64::BITS.wrapping_sub(lost)).unwrap_or(0) != 0;
+        let steps = doubled >> 1;
+        let is_up = doubled & 1 == 1 && (is_more || steps & 1 == 1);
+        let steps = (steps + u64::from(is_up)).cast_signed();
+        Some(Self::from_bits(if bits >> 63 == 1 { -steps } else { steps }))
     }
 
     /// The value in mm, rounded to f64 (exact up to 2 m). For records and reports, not for the tick.

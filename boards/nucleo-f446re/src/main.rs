@@ -56,7 +56,7 @@ mod stop;
 
 use core::sync::atomic::Ordering;
 
-use armv7m_double as _;
+use armv7m_runtime as _;
 use defmt_rtt as _;
 
 // The tick's number before every line of the log.

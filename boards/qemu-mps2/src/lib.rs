@@ -34,7 +34,7 @@ pub mod uart;
 
 use ::core::panic::PanicInfo;
 
-use armv7m_double as _;
+use armv7m_runtime as _;
 use semihosting::process;
 
 /// The kernel's number type on this core.

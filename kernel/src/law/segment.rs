@@ -167,13 +167,18 @@ struct Clock {
     step: u64,
 }
 
+/// 2⁶⁴, the last f64 below it, and 2⁹⁶.
+const POWER_64: f64 = 18_446_744_073_709_551_616.0;
+const LAST_BELOW: f64 = POWER_64.next_down();
+const POWER_96: f64 = POWER_64 * 4_294_967_296.0;
+
 impl Clock {
     #[inline(never)]
     fn new(duration: Ticks) -> Self {
         let step = match duration.0 {
             0 => 0,
-            bits if bits > Ticks::ONE.0 => quotient(Ticks::ONE.0, 0, bits),
-            bits => quotient(0, u64::MAX, bits),
+            bits if bits > Ticks::ONE.0 => quotient(POWER_96, 0, bits),
+            bits => quotient(POWER_64, u64::MAX, bits),
         };
         Self { duration, step }
     }
@@ -192,17 +197,23 @@ impl Clock {
     }
 }
 
-/// (high·2⁶⁴ + low)/by, rounded down, for high < by ≤ 2⁶³. Bit by bit: it is for the background, and a divider of
-/// 64 bits takes half a kilobyte of flash, one of 128 a kilobyte.
-fn quotient(high: u64, low: u64, by: u64) -> u64 {
-    let (mut remainder, mut digits) = (high, low);
-    for _ in 0..rolled(u64::BITS) {
-        let next = remainder << 1 | digits >> 63;
-        let is_one = next >= by;
-        remainder = if is_one { next - by } else { next };
-        digits = digits << 1 | u64::from(is_one);
-    }
-    digits
+/// The quotient by `by` ≤ 2⁶³, rounded down, of a dividend of which there are `about`, no more than 2⁶⁴ times `by`, and its lower 64
+/// bits. By quotients of f64, two of which take less than 64 digits.
+fn quotient(about: f64, lower: u64, by: u64) -> u64 {
+    /// What the first quotient leaves is above −2⁴⁶, of a dividend of up to 2⁹⁶.
+    const NEGATIVE: u64 = (1_u64 << 46).wrapping_neg();
+    let by_about = by as f64;
+    let first = about / by_about;
+    let first = if is_within(first, 0.0, LAST_BELOW) { whole(first) } else { u64::MAX };
+    let left = lower.wrapping_sub(first.wrapping_mul(by));
+    let is_negative = left >= NEGATIVE;
+    let magnitude = if is_negative { left.wrapping_neg() } else { left };
+    let second = whole(magnitude as f64 / by_about);
+    let second = if is_negative { second.wrapping_neg() } else { second };
+    let found = first.wrapping_add(second);
+    // The last place.
+    let left = lower.wrapping_sub(found.wrapping_mul(by));
+    if left >= NEGATIVE { found.wrapping_sub(1) } else { found.wrapping_add(u64::from(left >= by)) }
 }
 
 /// a·b/2³² for b ≤ 2³².
@@ -347,7 +358,10 @@ impl<R: Real> FeedSegment<R> {
         let [rise_bits, fall_less_bits, hold_start_bits, hold_linear_bits, hold_square_bits] =
             lengths.map(Position::to_bits);
         let ([from_mm_s, to_mm_s], [hold_v_mm_s, hold_a_mm_s2, hold_gain_mm_s]) = (feeds, scales);
-        let segment = Self {
+        if let Some(error) = refused {
+            return Err(error);
+        }
+        Ok(Self {
             length,
             from_mm_s,
             to_mm_s,
@@ -366,8 +380,7 @@ impl<R: Real> FeedSegment<R> {
             hold_v_mm_s,
             hold_a_mm_s2,
             hold_gain_mm_s,
-        };
-        refused.map_or(Ok(segment), Err)
+        })
     }
 
     /// The length of path it covers.
@@ -565,7 +578,11 @@ pub(super) fn check(
             tick_s,
         ],
         // Any type will do; the type of lengths needs no extra function in the image.
-        |value| is_within(value, 0.0, f64::MAX).then_some(Position::ZERO),
+        // By their bits; twice a zero with a sign is 0.
+        |value| {
+            let bits = value.to_bits();
+            (bits <= f64::MAX.to_bits() || bits << 1 == 0).then_some(Position::ZERO)
+        },
     );
     if t1_s <= 0.0 && from_mm_s != to_mm_s {
         refused.get_or_insert(SegmentError::FeedStep { from_mm_s, to_mm_s });

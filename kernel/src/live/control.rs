@@ -318,7 +318,7 @@ where
             return Ok(false);
         }
         let block_end = chooser.block_end;
-        let acted = self.act(choice, list, (!is_stop).then_some(is_stop_asked), feeder);
+        let acted = self.act(choice, &mut list, (!is_stop).then_some(is_stop_asked), feeder);
         if let Ok(HandOver::GivenUp) = acted {
             self.reader.feed_mut().roll_back();
             return Ok(false);
@@ -336,7 +336,7 @@ where
     fn act(
         &mut self,
         choice: Choice,
-        mut list: List,
+        list: &mut List,
         unless: Option<&dyn Fn() -> bool>,
         feeder: &mut LiveFeeder<'_, R, AXES>,
     ) -> Result<HandOver, SupplyError<E>> {

@@ -237,6 +237,8 @@ fn changed(from_mm_s: f64, change_mm_s: f64) -> f64 {
 #[derive(Clone, Debug)]
 pub(super) struct List {
     start: Splice,
+    /// Where its last item ends.
+    end: Splice,
     tick_s: f64,
     items: Vec<(Splice, Item), LIST_ITEMS>,
     /// An item was appended for which there was no place.
@@ -247,13 +249,23 @@ pub(super) struct List {
 
 impl List {
     pub(super) fn new(start: Splice, tick_s: f64) -> Self {
-        Self { start, tick_s, items: Vec::new(), is_overfull: false, exit: 0, ends_block: false }
+        Self { start, end: start, tick_s, items: Vec::new(), is_overfull: false, exit: 0, ends_block: false }
+    }
+
+    /// Becomes like `other`, of which the items that there are are copied.
+    pub(super) fn copy(&mut self, other: &Self) {
+        self.items.clear();
+        let is_whole = self.items.extend_from_slice(&other.items).is_ok();
+        debug_assert!(is_whole, "there is as much room");
+        (self.start, self.end) = (other.start, other.end);
+        (self.tick_s, self.is_overfull) = (other.tick_s, other.is_overfull);
+        (self.exit, self.ends_block) = (other.exit, other.ends_block);
     }
 
     /// Empties the list and lets it begin at `start`.
     pub(super) fn restart(&mut self, start: Splice) {
         self.truncate(0);
-        (self.start, self.exit, self.ends_block) = (start, 0, false);
+        (self.start, self.end, self.exit, self.ends_block) = (start, start, 0, false);
     }
 
     /// The control tick that it is for \[s\].
@@ -306,7 +318,7 @@ impl List {
     /// Appends an item; the caller has left a place for it. Removes the rounding between its feed and the
     /// list's; returns the item as appended.
     pub(super) fn push(&mut self, mut item: Item) -> Item {
-        let end = self.end();
+        let end = self.end;
         if let Item::Feed(PlannedRamp { ramp, .. }) = &mut item
             && libm::fabs(ramp.from_mm_s - end.feed_mm_s) <= FEED_ROUNDING_MM_S * (1.0 + end.feed_mm_s)
         {
@@ -315,7 +327,11 @@ impl List {
             }
             ramp.from_mm_s = end.feed_mm_s;
         }
-        self.is_overfull |= self.items.push((end, item)).is_err();
+        if self.items.push((end, item)).is_ok() {
+            self.end = item.end(&end, self.tick_s);
+        } else {
+            self.is_overfull = true;
+        }
         debug_assert!(!self.is_overfull, "an item without a place");
         item
     }
@@ -339,6 +355,7 @@ impl List {
     }
 
     pub(super) fn truncate(&mut self, len: usize) {
+        self.end = self.after(len);
         self.items.truncate(len);
         self.is_overfull = false;
     }
@@ -358,7 +375,7 @@ impl List {
 
     /// Where its last item ends.
     pub(super) fn end(&self) -> Splice {
-        self.items.last().map_or(self.start, |(start, item)| item.end(start, self.tick_s))
+        self.end
     }
 
     /// The splice after this many items.

@@ -57,10 +57,16 @@ struct Handed {
     before: Density,
 }
 
-/// The list that follows the one under way.
-#[derive(Debug)]
+impl Handed {
+    /// Nothing, before all motion.
+    fn nothing(tick_s: f64) -> Self {
+        Self { id: 0, list: List::new(Timeline::BEGIN, tick_s), before: Density::NONE }
+    }
+}
+
+/// Why there is a list that follows the one under way.
+#[derive(Clone, Copy, Debug)]
 struct Next {
-    handed: Handed,
     /// The command it was made for, if any.
     request: Option<Request>,
     /// The override of the motion before it.
@@ -71,7 +77,9 @@ struct Next {
 #[derive(Debug)]
 pub(super) struct Timeline {
     tick_s: f64,
-    under_way: Handed,
+    /// The list under way and the next one, by turns: what is handed over is copied item by item, and never moved.
+    lists: [Handed; 2],
+    is_second_under_way: bool,
     next: Option<Next>,
     /// Where the next list begins.
     splice: Splice,
@@ -92,7 +100,8 @@ impl Timeline {
     pub(super) fn new(tick_s: f64, leads: Leads) -> Self {
         Self {
             tick_s,
-            under_way: Handed { id: 0, list: List::new(Self::BEGIN, tick_s), before: Density::NONE },
+            lists: [Handed::nothing(tick_s), Handed::nothing(tick_s)],
+            is_second_under_way: false,
             next: None,
             splice: Self::BEGIN,
             driven_override: 1.0,
@@ -104,7 +113,7 @@ impl Timeline {
 
     /// As new. The leads stay as far as they have grown.
     pub(super) fn restart(&mut self) {
-        let Handed { id, list, before } = &mut self.under_way;
+        let Handed { id, list, before } = self.under_way_mut();
         list.restart(Self::BEGIN);
         (*id, *before, self.next) = (0, Density::NONE, None);
         (self.splice, self.driven_override, self.waited_at) = (Self::BEGIN, 1.0, None);
@@ -114,20 +123,42 @@ impl Timeline {
     #[cfg(test)]
     pub(super) fn driving(list: List, tick_s: f64) -> Self {
         let splice = list.exit_splice();
-        let under_way = Handed { id: 0, list, before: Density::NONE };
-        Self { under_way, splice, ..Self::new(tick_s, Leads::NONE) }
+        let under_way = Handed { list, ..Handed::nothing(tick_s) };
+        let lists = [under_way, Handed::nothing(tick_s)];
+        Self { lists, splice, ..Self::new(tick_s, Leads::NONE) }
+    }
+
+    fn under_way(&self) -> &Handed {
+        let [first, second] = &self.lists;
+        if self.is_second_under_way { second } else { first }
+    }
+
+    fn under_way_mut(&mut self) -> &mut Handed {
+        let [first, second] = &mut self.lists;
+        if self.is_second_under_way { second } else { first }
+    }
+
+    /// The other one, which is the next list's, if there is one.
+    fn other(&self) -> &Handed {
+        let [first, second] = &self.lists;
+        if self.is_second_under_way { first } else { second }
+    }
+
+    fn other_mut(&mut self) -> &mut Handed {
+        let [first, second] = &mut self.lists;
+        if self.is_second_under_way { first } else { second }
     }
 
     /// The list under way.
     pub(super) fn list(&self) -> &List {
-        &self.under_way.list
+        &self.under_way().list
     }
 
     /// The lists that the tick has and will have.
     #[cfg(feature = "scope")]
     pub(super) fn handed(&self) -> impl Iterator<Item = (u8, &List)> {
-        let next = self.next.as_ref().map(|next| &next.handed);
-        core::iter::once(&self.under_way).chain(next).map(|handed| (handed.id, &handed.list))
+        let next = self.next.map(|_| self.other());
+        core::iter::once(self.under_way()).chain(next).map(|handed| (handed.id, &handed.list))
     }
 
     /// Where the next list begins.
@@ -146,7 +177,7 @@ impl Timeline {
 
     /// The request that the next list was made for.
     pub(super) fn request_of_next(&self) -> Option<Request> {
-        self.next.as_ref()?.request
+        self.next?.request
     }
 
     /// Notes the request that the next list, if there is one, was made for.
@@ -162,22 +193,22 @@ impl Timeline {
             Request::Stop => self.stop_lead,
             Request::Override => self.plan_lead,
         };
-        Places::new(&self.under_way.list, progress, lead, self.tick_s)
+        Places::new(self.list(), progress, lead, self.tick_s)
     }
 
     /// Whether everything handed over has been driven.
     pub(super) fn is_driven(&self, progress: &Progress) -> bool {
-        progress.list == self.under_way.id
+        progress.list == self.under_way().id
             && self.next.is_none()
             && progress.inside.is_none()
             && !progress.waits
-            && progress.done as usize >= self.under_way.list.len()
+            && progress.done as usize >= self.list().len()
     }
 
     /// Notes that motion has waited at the end of the list under way.
     pub(super) fn has_waited(&mut self) {
-        self.waited_at = Some(self.under_way.list.end());
-        self.under_way.list.set_ends_block(false);
+        self.waited_at = Some(self.list().end());
+        self.under_way_mut().list.set_ends_block(false);
     }
 
     /// Whether motion is to wait where the next list begins: at a block end where it has not waited yet.
@@ -185,12 +216,12 @@ impl Timeline {
         let splice = &self.splice;
         let has_waited = || self.waited_at.is_some_and(|waited| BlockEnd::from(waited).is_at(splice));
         let is_block_end = || lookahead.block_ends(splice.stretch).any(|end| end.is_at(splice));
-        self.under_way.list.ends_block() || splice.is_at_rest() && !has_waited() && is_block_end()
+        self.list().ends_block() || splice.is_at_rest() && !has_waited() && is_block_end()
     }
 
     /// Marks the list under way as ending a block.
     pub(super) fn end_block(&mut self) {
-        self.under_way.list.set_ends_block(true);
+        self.under_way_mut().list.set_ends_block(true);
     }
 
     /// Returns the tick's progress. Once the tick is on the next list, that is the list under way.
@@ -200,9 +231,9 @@ impl Timeline {
         feeder: &mut LiveFeeder<'_, R, AXES>,
     ) -> Progress {
         let progress = feeder.progress();
-        if let Some(next) = self.next.take_if(|next| next.handed.id == progress.list) {
-            feeder.give_up(self.under_way.id);
-            self.under_way = next.handed;
+        if self.next.is_some() && self.other().id == progress.list {
+            feeder.give_up(self.under_way().id);
+            (self.is_second_under_way, self.next) = (!self.is_second_under_way, None);
             feed.follow();
         }
         progress
@@ -216,10 +247,10 @@ impl Timeline {
     ) -> Progress {
         feeder.no_change();
         let progress = self.follow(feed, feeder);
-        if let Some(Next { handed, before_override, .. }) = self.next.take() {
-            feeder.give_up(handed.id);
+        if let Some(Next { before_override, .. }) = self.next.take() {
+            feeder.give_up(self.other().id);
             self.driven_override = before_override;
-            self.splice = self.under_way.list.exit_splice();
+            self.splice = self.list().exit_splice();
             feed.roll_back();
         }
         progress
@@ -238,7 +269,7 @@ impl Timeline {
 
     /// Whether motion is in the fallback stop of the list under way, because nothing followed in time.
     pub(super) fn is_in_fallback(&self, progress: &Progress) -> bool {
-        let Handed { id, list, .. } = &self.under_way;
+        let Handed { id, list, .. } = self.under_way();
         let (done, exit) = (progress.done as usize, list.exit());
         let is_in_stop = done > exit || done == exit && progress.inside.is_some();
         self.next.is_none() && progress.list == *id && is_in_stop && exit < list.len()
@@ -247,18 +278,18 @@ impl Timeline {
     /// Lets the list under way be driven to its end, fallback stop included; the next list begins there.
     /// False if it would be driven to its end anyway.
     pub(super) fn drive_to_end(&mut self) -> bool {
-        let list = &mut self.under_way.list;
+        let list = &mut self.under_way_mut().list;
         if list.exit() >= list.len() {
             return false;
         }
         list.set_exit_to_end();
-        self.splice = list.end();
+        self.splice = self.list().end();
         true
     }
 
     /// The density of the list under way up to where another takes over.
     fn density_before(&self, takeover: Takeover) -> Density {
-        let Handed { list, before, .. } = &self.under_way;
+        let Handed { list, before, .. } = self.under_way();
         let mut density = *before;
         for duration in list.items().take(takeover.driven()).filter_map(|item| item.duration(self.tick_s)) {
             let accepted = density.follow(duration);
@@ -279,7 +310,7 @@ impl Timeline {
     /// for, which `unless` says, or that a fault asks for comes first: the list is given up, and all is as before.
     pub(super) fn hand_over<R: Real, E, const AXES: usize, const PLACES: usize>(
         &mut self,
-        list: List,
+        list: &List,
         takeover: Takeover,
         feed_override: f64,
         lookahead: &Lookahead<PLACES>,
@@ -290,12 +321,12 @@ impl Timeline {
         let id = feeder.begin(list.start().at, from, before);
         let id = id.ok_or(SupplyError::Rejected(Rejection::full("feed lists", LISTS.into())))?;
         let change = Change {
-            from: self.under_way.id,
+            from: self.under_way().id,
             to: id,
             after: takeover.driven() as u32,
             within: matches!(takeover, Takeover::Within(_)),
         };
-        let handed_over = match self.fill(&list, id, lookahead, unless, feeder) {
+        let handed_over = match self.fill(list, id, lookahead, unless, feeder) {
             Ok(HandOver::Done) => {
                 feeder.change(change).map(|()| HandOver::Done).map_err(SupplyError::Rejected)
             }
@@ -307,8 +338,10 @@ impl Timeline {
         }
         self.splice = list.exit_splice();
         let before_override = core::mem::replace(&mut self.driven_override, feed_override);
-        let handed = Handed { id, list, before };
-        self.next = Some(Next { handed, request: None, before_override });
+        self.next = Some(Next { request: None, before_override });
+        let next = self.other_mut();
+        (next.id, next.before) = (id, before);
+        next.list.copy(list);
         handed_over
     }
 

@@ -14,7 +14,6 @@
 mod budget;
 mod cycles;
 mod digest;
-mod double;
 mod firmware;
 mod firmware_link;
 mod functions;
@@ -23,6 +22,7 @@ mod killed;
 mod linked;
 mod preempted;
 mod programs;
+mod runtime;
 mod search;
 mod tools;
 
@@ -56,8 +56,8 @@ const TESTS: [(&str, bool, Test); 19] = [
     ("instructions_of_a_tick", true, budget::instructions_of_a_tick),
     ("the_longest_ticks_and_turns", true, search::the_longest_ticks_and_turns),
     ("instructions_of_functions", true, functions::instructions_of_functions),
-    ("the_same_sums_and_products", false, double::the_same_sums_and_products),
-    ("instructions_of_double", true, double::instructions_of_double),
+    ("the_same_sums_and_products", false, runtime::the_same_sums_and_products),
+    ("instructions_of_the_runtime", true, runtime::instructions_of_the_runtime),
     ("sizes", true, image::sizes),
 ];
 

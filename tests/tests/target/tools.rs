@@ -113,7 +113,7 @@ pub(crate) const COUNTING: [&str; 2] = ["-icount", "shift=6,sleep=off"];
 
 /// The images that tests ask for, by features.
 const IMAGES: [(&str, &[&str]); 6] = [
-    ("", &["closed_loop", "interrupt", "budget", "functions", "double", "kernel_only", "empty"]),
+    ("", &["closed_loop", "interrupt", "budget", "functions", "runtime", "kernel_only", "empty"]),
     ("live", &["live", "live_budget", "answers", "budget", "kernel_only", "empty"]),
     ("compensation", &["live_budget"]),
     ("watch", &["live_interrupt"]),

@@ -32,17 +32,43 @@ pub struct CutRamp {
     pub cut_s: f64,
 }
 
+/// What a cut ramp comes to. All of it comes from what the pulse has gained by the cut, and that takes a while.
+struct Cut {
+    /// The greatest acceleration, in the middle, with the sign of the change of feed \[mm/s²\].
+    peak_accel_mm_s2: f64,
+    /// The feed at its end \[mm/s\].
+    to_mm_s: f64,
+    /// Its length \[mm\].
+    length_mm: f64,
+    /// Its length up to the middle \[mm\].
+    middle_mm: f64,
+}
+
 impl CutRamp {
+    fn cut(&self) -> Cut {
+        let &Self { ramp, cut_s } = self;
+        let gained = ramp.pulse().at(cut_s);
+        let peak_accel_mm_s2 = 2.0 * gained.a_mm_s2;
+        let to_mm_s = ramp.from_mm_s + 2.0 * cut_s * peak_accel_mm_s2;
+        let cut_mm = ramp.from_mm_s * cut_s + gained.s_mm;
+        Cut {
+            peak_accel_mm_s2,
+            to_mm_s,
+            length_mm: 0.5 * (ramp.from_mm_s + to_mm_s) * self.duration_s(),
+            middle_mm: 2.0 * cut_mm + 0.5 * peak_accel_mm_s2 * cut_s * cut_s,
+        }
+    }
+
     /// The greatest acceleration, in the middle, with the sign of the change of feed \[mm/s²\].
     #[must_use]
     pub fn peak_accel_mm_s2(&self) -> f64 {
-        2.0 * self.ramp.pulse().at(self.cut_s).a_mm_s2
+        self.cut().peak_accel_mm_s2
     }
 
     /// The feed at its end \[mm/s\].
     #[must_use]
     pub fn to_mm_s(&self) -> f64 {
-        self.ramp.from_mm_s + 2.0 * self.cut_s * self.peak_accel_mm_s2()
+        self.cut().to_mm_s
     }
 
     /// Its duration \[s\].
@@ -54,7 +80,7 @@ impl CutRamp {
     /// Its length \[mm\].
     #[must_use]
     pub fn length_mm(&self) -> f64 {
-        0.5 * (self.ramp.from_mm_s + self.to_mm_s()) * self.duration_s()
+        self.cut().length_mm
     }
 }
 
@@ -72,14 +98,15 @@ impl<R: Real> FeedSegment<R> {
     pub fn cut(ramp: &Ramp<f64>, cut_at: Ticks, length: Position, tick_s: f64) -> Result<Self, SegmentError> {
         // As for the whole ramp: rounding here would be a step there.
         let ramp = &super::to_f64(ramp);
-        let cut = CutRamp { ramp: *ramp, cut_s: cut_at.to_f64() * tick_s };
-        let CutRamp { cut_s, .. } = cut;
+        let cut_s = cut_at.to_f64() * tick_s;
         let rise_ticks = ramp.t1_s / tick_s;
         let edge_ticks = ramp.edge_s / tick_s;
         if !(cut_s > 0.0 && cut_at.to_f64() <= edge_ticks + ROUNDING_TICKS && rise_ticks > 1.0) {
             return Err(SegmentError::OutOfRange { quantity: "cut in the rise [s]", value: cut_s });
         }
-        let (path_mm, ramp_mm) = (length.to_mm(), cut.length_mm());
+        let Cut { peak_accel_mm_s2: peak, to_mm_s, length_mm: ramp_mm, middle_mm } =
+            CutRamp { ramp: *ramp, cut_s }.cut();
+        let path_mm = length.to_mm();
         if !(libm::fabs(ramp_mm - path_mm) <= super::LENGTH_TOLERANCE_MM) {
             return Err(SegmentError::LengthMismatch { ramp_mm, path_mm });
         }
@@ -87,7 +114,6 @@ impl<R: Real> FeedSegment<R> {
         let whole_mm = Position::from_mm(ramp.length_mm())
             .ok_or(SegmentError::OutOfRange { quantity: "length [mm]", value: ramp.length_mm() })?;
         let mut segment = Self::new(ramp, whole_mm, tick_s)?;
-        let to_mm_s = cut.to_mm_s();
         let bits = |quantity, mm: f64| {
             Position::from_mm(mm)
                 .map(Position::to_bits)
@@ -97,10 +123,7 @@ impl<R: Real> FeedSegment<R> {
             R::checked_from_f64(value).ok_or(SegmentError::OutOfRange { quantity, value })
         };
         let t1_s = ramp.t1_s;
-        let peak = cut.peak_accel_mm_s2();
         let middle_mm_s = ramp.from_mm_s + peak * cut_s;
-        let cut_mm = ramp.from_mm_s * cut_s + ramp.pulse().at(cut_s).s_mm;
-        let middle_mm = 2.0 * cut_mm + 0.5 * peak * cut_s * cut_s;
         let step = segment.rise.step;
         // x₁ as the tick counts it, in steps.
         let cut_part = (u128::from(step) * u128::from(cut_at.0)) >> 32;

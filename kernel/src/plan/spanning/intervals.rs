@@ -445,11 +445,15 @@ impl<'a> Intervals<'a> {
         } else {
             peak(&law, feed, other.feed_mm_s, beyond.length_mm).min(mean_mm_s)
         };
-        if !(peak > feed) {
+        // Each of these takes a while.
+        if !(peak > feed) || self.attention.is_wanted() {
             return 0.0;
         }
         let lag_s = |from: f64, to: f64| law.ramp_time_s(to - from) - law.ramp_length_mm(from, to) / peak;
         let rested = lag_s(bound.feed_mm_s, feed) + lag_s(feed, peak);
+        if self.attention.is_wanted() {
+            return 0.0;
+        }
         let ramp = Ramp::new(&law, bound.feed_mm_s, peak);
         let waited_mm = (root.end_mm - root.start_mm) + gap.length_mm - ramp.length_to_feed_mm(feed);
         let waited_s = match (waited_mm > 0.0, bound.feed_mm_s > 0.0) {

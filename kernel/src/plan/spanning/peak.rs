@@ -96,6 +96,9 @@ impl<'a> Sides<'a> {
 
     /// Plans both sides up to the peak with the least time, and returns that peak.
     pub(super) fn best(&self, up: &mut Ascent<'_>, down: &mut Ascent<'_>) -> Option<f64> {
+        if self.intervals.attention.is_wanted() {
+            return None;
+        }
         self.start(up, down);
         let (mut low, mut high) = (self.lowest(), self.highest());
         let at_high = self.fit(high, up, down);

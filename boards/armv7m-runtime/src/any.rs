@@ -1,6 +1,6 @@
 //! Sums, products and quotients of any two numbers: zeros, subnormal ones, infinities and what is not a number, too.
 //!
-//! The routines come here with what their short way does not take. IEEE 754, to nearest, ties to even. In whole numbers:
+//! `double` comes here with what its short way does not take. IEEE 754, to nearest, ties to even. In whole numbers:
 //! an operation of f64 would be a call of the routine that asks.
 
 use core::cmp::Ordering;
