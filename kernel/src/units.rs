@@ -60,13 +60,14 @@ impl Position {
     #[inline(never)]
     pub fn from_mm(mm: f64) -> Option<Self> {
         const FRACTION_BITS: u32 = f64::MANTISSA_DIGITS - 1;
+        const { assert!(Self::LIMIT_MM < 1_048_576.0, "the last digit is below half a step") };
         // By its digits: on a core without f64 a comparison, a product and a sum are subroutines.
         let bits = mm.to_bits();
         let magnitude = bits & (u64::MAX >> 1);
         if magnitude > Self::LIMIT_MM.to_bits() {
             return None;
         }
-        // Twice the last digit is `lost` places below a step; of what is subnormal nothing remains anyway.
+        // Twice the last digit is `lost` places below a step; of a subnormal number nothing remains anyway.
         let digits = magnitude & ((1 << FRACTION_BITS) - 1) | 1 << FRACTION_BITS;
         let lost = (1023 + FRACTION_BITS - 32 - 1) - (magnitude >> FRACTION_BITS) as u32;
         let doubled = digits.checked_shr(lost).unwrap_or(0);

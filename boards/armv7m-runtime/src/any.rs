@@ -1,4 +1,4 @@
-//! Sums, products and quotients of any two numbers: zeros, subnormal ones, infinities and what is not a number, too.
+//! Sums, products, quotients and the order of any two numbers: zeros, subnormal numbers, infinities and NaN, too.
 //!
 //! `double` comes here with what its short way does not take. IEEE 754, to nearest, ties to even. In whole numbers:
 //! an operation of f64 would be a call of the routine that asks.
@@ -129,10 +129,9 @@ pub(crate) extern "C" fn product(a: u64, b: u64) -> u64 {
     let first = part(a_whole >> 32, b_whole) + (lowest >> 32);
     let second = part(a_whole, b_whole >> 32) + (first & 0xFFFF_FFFF);
     let high = part(a_whole >> 32, b_whole >> 32) + (first >> 32) + (second >> 32);
-    let is_more = second << 32 != 0 || lowest << 32 != 0;
     // From 2^51 to 2^53: where guard bits are missing, they are taken from below.
     let whole = high << GUARD_BITS | (second & 0xFFFF_FFFF) >> (32 - GUARD_BITS);
-    let is_more = is_more && (second << (32 + GUARD_BITS) != 0 || lowest << 32 != 0);
+    let is_more = second << (32 + GUARD_BITS) != 0 || lowest << 32 != 0;
     rounded(sign, a.exponent + b.exponent - BIAS + 1, whole | u64::from(is_more))
 }
 
@@ -162,7 +161,7 @@ pub(crate) extern "C" fn quotient(a: u64, b: u64) -> u64 {
     rounded(sign, a.exponent - b.exponent + BIAS, digits | u64::from(rest != 0))
 }
 
-/// The order of two numbers; `None` if one is not a number.
+/// The order of two numbers; `None` if one is NaN.
 fn order(a: u64, b: u64) -> Option<Ordering> {
     if is_nan(a) || is_nan(b) {
         return None;
@@ -192,4 +191,14 @@ pub(crate) extern "C" fn is_not_greater(a: u64, b: u64) -> u32 {
 /// Whether a ≥ b.
 pub(crate) extern "C" fn is_not_less(a: u64, b: u64) -> u32 {
     u32::from(order(a, b).is_some_and(Ordering::is_ge))
+}
+
+/// Whether a = b.
+pub(crate) extern "C" fn is_equal(a: u64, b: u64) -> u32 {
+    u32::from(order(a, b).is_some_and(Ordering::is_eq))
+}
+
+/// Whether one is NaN.
+pub(crate) extern "C" fn is_unordered(a: u64, b: u64) -> u32 {
+    u32::from(order(a, b).is_none())
 }

@@ -1,7 +1,8 @@
-//! The routines: what is short, in assembly; what is seldom, by [`any`].
+//! Sums, products, quotients and comparisons of f64: of normal numbers in assembly, of all others by [`any`].
 //!
-//! Numbers keep their sign and exponent in place: where the fraction of a sum carries into the exponent, that is then
-//! right by itself. What lies below the last place is one word, and rounds by its carry.
+//! A number is two words, sign and exponent with the upper 20 bits of its fraction in the second. They stay in place: where
+//! the fraction of a sum carries into the exponent, that is right by itself. What lies below the last place is one word, and
+//! rounds by the carry of its comparison with a half. Decision 57 has the reasons.
 
 use core::arch::naked_asm;
 
@@ -35,13 +36,13 @@ extern "C" fn __aeabi_dadd(a: u64, b: u64) -> u64 {
         "mov r4, r5",
         "mov r5, r6",
         "2:",
-        // Infinite or not a number.
+        // Infinite or NaN.
         "mvns r6, r4, asr #21",
         "beq 90f",
         // Zero or subnormal.
         "lsrs r5, r5, #21",
         "beq 80f",
-        // How many places they are apart.
+        // The difference of the exponents.
         "rsb r5, r5, r4, lsr #21",
         "cmp r5, #32",
         "bhs 50f",
@@ -269,9 +270,14 @@ extern "C" fn __aeabi_dmul(a: u64, b: u64) -> u64 {
 
 /// a/b.
 ///
-/// With m and n the 53 bits of a and b: a reciprocal of n's upper 32 bits, to 2⁻²⁸; by it the first digit of 32 bits, what
-/// it leaves, and a second digit. What is found is off by less than 2⁻⁵⁴, and what it leaves then, exactly, says whether it
-/// is to be rounded up. A quotient of two numbers is never half way between two others.
+/// With m and n the 53 bits of a and b: a reciprocal of n's upper 32 bits; by it the first digit of 32 bits, what it leaves, and a
+/// second digit. What both leave, exactly, says whether the quotient is rounded up: a quotient of two numbers is never half way
+/// between two others. So it need not be rounded down rightly before, but has to be off by less than half a place.
+///
+/// It is. The first reciprocal takes n's upper 16 bits plus one: it is too small by up to 1.25·2⁻¹⁵ of itself, and after one step of
+/// Newton's method by up to 2.6·2⁻³⁰. The first digit is then too small by up to 17 of 2³². The second one counts with the upper
+/// word of what is left, 128 units of 2⁻⁶⁴ a step, and by that reciprocal: both together are too small by up to 300 units. A place
+/// of the quotient is 1024 units or, where m ≥ n, 2048.
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
 extern "C" fn __aeabi_ddiv(a: u64, b: u64) -> u64 {
@@ -303,7 +309,7 @@ extern "C" fn __aeabi_ddiv(a: u64, b: u64) -> u64 {
         "movlo r5, #21",
         "add r4, r4, #21",
         "sub r4, r4, r5",
-        // The reciprocal r7 = 2⁶³/r6, a little below it: 15 bits, then twice as many.
+        // The reciprocal r7 = 2⁶³/r6: 15 bits, then by Newton's method 28.
         "lsl r6, r3, #11",
         "orr r6, r6, r2, lsr #21",
         "lsr r7, r6, #16",
@@ -335,7 +341,7 @@ extern "C" fn __aeabi_ddiv(a: u64, b: u64) -> u64 {
         "lsr lr, lr, #24",
         "orr lr, lr, r6, lsl #8",
         "add r12, r12, r6, asr #24",
-        // The 53 bits of both.
+        // The 53 bits of both digits.
         "rsb r6, r5, #31",
         "lsr lr, lr, r6",
         "add r7, r5, #1",
@@ -388,7 +394,7 @@ macro_rules! comparison {
                 concat!("movlo r0, #", $if_so),
                 concat!("movhs r0, #", $if_not),
                 "bx lr",
-                // Infinite or not a number.
+                // Infinite or NaN.
                 "3:",
                 "lsl r12, r1, #1",
                 "mvns r12, r12, asr #21",
@@ -396,7 +402,7 @@ macro_rules! comparison {
                 "lslne r12, r3, #1",
                 "it ne",
                 "mvnsne.w r12, r12, asr #21",
-                "beq {any}",
+                "beq 9f",
                 "teq r1, r3",
                 "bmi 4f",
                 "cmp r1, #0",
@@ -421,6 +427,8 @@ macro_rules! comparison {
                 "it mi",
                 concat!("movmi r0, #", $if_so),
                 "bx lr",
+                "9:",
+                "b {any}",
                 any = sym $any,
             )
         }
@@ -443,3 +451,53 @@ comparison!(
     /// Whether a ≥ b: not a < b.
     __aeabi_dcmpge, any::is_not_less, x: "r0", "r1", y: "r2", "r3", "0", "1"
 );
+
+/// Whether a = b.
+#[unsafe(no_mangle)]
+#[unsafe(naked)]
+extern "C" fn __aeabi_dcmpeq(a: u64, b: u64) -> u32 {
+    naked_asm!(
+        "cmp r0, r2",
+        "it eq",
+        "cmpeq r1, r3",
+        "bne 2f",
+        // The same bits, but NaN equals nothing.
+        "lsl r12, r1, #1",
+        "mvns r12, r12, asr #21",
+        "beq 9f",
+        "mov r0, #1",
+        "bx lr",
+        // Other bits are equal only as zeros.
+        "2:",
+        "orr r0, r0, r2",
+        "orr r0, r0, r1, lsl #1",
+        "orrs r0, r0, r3, lsl #1",
+        "ite eq",
+        "moveq r0, #1",
+        "movne r0, #0",
+        "bx lr",
+        "9:",
+        "b {any}",
+        any = sym any::is_equal,
+    )
+}
+
+/// Whether one is NaN.
+#[unsafe(no_mangle)]
+#[unsafe(naked)]
+extern "C" fn __aeabi_dcmpun(a: u64, b: u64) -> u32 {
+    naked_asm!(
+        "lsl r12, r1, #1",
+        "mvns r12, r12, asr #21",
+        "it ne",
+        "lslne r12, r3, #1",
+        "it ne",
+        "mvnsne.w r12, r12, asr #21",
+        "beq 9f",
+        "mov r0, #0",
+        "bx lr",
+        "9:",
+        "b {any}",
+        any = sym any::is_unordered,
+    )
+}

@@ -1,10 +1,10 @@
-//! Pairs of numbers to try the routines with: far apart and near, of long fractions and short ones, whose sums and products
-//! are half way between two numbers, at the ends of the range, and all that is no normal number.
+//! Pairs of numbers to test the routines with: with exponents far apart and near; with short fractions, so that sums and products
+//! are half way between two numbers; at both ends of the range; and zeros, infinities and NaN.
 
 const FRACTION: u64 = (1 << 52) - 1;
 const SIGN: u64 = 1 << 63;
-/// What rules are made for, as bits without sign: zero, the least number, the greatest subnormal and the least normal one, one, the greatest
-/// number, infinity, what is not a number.
+/// Numbers with rules of their own, as bits without sign: zero, the least number, the greatest subnormal number, the least normal
+/// one, 1, the greatest number, infinity, NaN.
 const SPECIAL: [u64; 8] =
     [0, 1, FRACTION, FRACTION + 1, 1023 << 52, (0x7FF << 52) - 1, 0x7FF << 52, (0x7FF << 52) + 1];
 
@@ -69,18 +69,19 @@ impl Iterator for Operands {
     }
 }
 
-/// A digest of results, in which what is not a number is all one.
+/// A digest of results, in which every NaN is the same.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Results(u64);
 
 impl Results {
-    /// Those of a pair: sum, difference, product and quotient; and whether the first is less, at most, more, at least the second.
-    pub fn take(&mut self, sum: f64, difference: f64, product: f64, quotient: f64, order: [bool; 4]) {
-        for result in [sum, difference, product, quotient] {
-            // By its bits: to compare is what is tried.
+    /// Adds those of a pair.
+    pub fn take(&mut self, x: f64, y: f64) {
+        for result in [x + y, x - y, x * y, x / y] {
+            // By its bits: comparisons are tested themselves.
             let bits = result.to_bits();
             self.add(if bits & !SIGN > 0x7FF << 52 { 0x7FF << 52 | 1 } else { bits });
         }
+        let order = [x < y, x <= y, x > y, x >= y, x == y, x.partial_cmp(&y).is_none()];
         self.add(order.into_iter().fold(0, |bits, is_so| bits << 1 | u64::from(is_so)));
     }
 

@@ -1,4 +1,4 @@
-//! Against the arithmetic of the processor that runs the tests. The routines in assembly are tried on emulated cores
+//! Against the arithmetic of the processor that runs the tests. The routines in assembly are tested on emulated cores
 //! (`cargo test -p motion-tests --test target`), with the same operands.
 
 extern crate std;
@@ -35,6 +35,8 @@ fn results_are_those_of_the_processor() {
             (any::is_greater(a, b), x > y),
             (any::is_not_greater(a, b), x <= y),
             (any::is_not_less(a, b), x >= y),
+            (any::is_equal(a, b), x == y),
+            (any::is_unordered(a, b), x.is_nan() || y.is_nan()),
         ] {
             assert_eq!(found, u32::from(expected), "pair {number}, {x:e} and {y:e}");
         }

@@ -197,8 +197,8 @@ impl Clock {
     }
 }
 
-/// The quotient by `by` ≤ 2⁶³, rounded down, of a dividend of which there are `about`, no more than 2⁶⁴ times `by`, and its lower 64
-/// bits. By quotients of f64, two of which take less than 64 digits.
+/// ⌊dividend/by⌋ for `by` ≤ 2⁶³ and a quotient of at most 2⁶⁴ − 1. The dividend is given as an f64 and as its lower 64 bits. Two
+/// divisions of f64 take fewer instructions than 64 steps bit by bit.
 fn quotient(about: f64, lower: u64, by: u64) -> u64 {
     /// What the first quotient leaves is above −2⁴⁶, of a dividend of up to 2⁹⁶.
     const NEGATIVE: u64 = (1_u64 << 46).wrapping_neg();
@@ -577,8 +577,8 @@ pub(super) fn check(
             hold_s,
             tick_s,
         ],
-        // Any type will do; the type of lengths needs no extra function in the image.
-        // By their bits; twice a zero with a sign is 0.
+        // 0 ≤ value ≤ MAX by its bits, −0 included: NaN and negative numbers have greater bits. Any type will do for the result;
+        // the type of lengths needs no extra function in the image.
         |value| {
             let bits = value.to_bits();
             (bits <= f64::MAX.to_bits() || bits << 1 == 0).then_some(Position::ZERO)

@@ -252,8 +252,8 @@ impl List {
         Self { start, end: start, tick_s, items: Vec::new(), is_overfull: false, exit: 0, ends_block: false }
     }
 
-    /// Becomes like `other`, of which the items that there are are copied.
-    pub(super) fn copy(&mut self, other: &Self) {
+    /// Becomes equal to `other`. Copies its items alone, not all places.
+    pub(super) fn assign(&mut self, other: &Self) {
         self.items.clear();
         let is_whole = self.items.extend_from_slice(&other.items).is_ok();
         debug_assert!(is_whole, "there is as much room");
@@ -375,6 +375,9 @@ impl List {
 
     /// Where its last item ends.
     pub(super) fn end(&self) -> Splice {
+        let of_the_last =
+            || self.items.last().map_or(self.start, |(start, item)| item.end(start, self.tick_s));
+        debug_assert_eq!(self.end, of_the_last());
         self.end
     }
 

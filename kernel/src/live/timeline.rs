@@ -77,7 +77,7 @@ struct Next {
 #[derive(Debug)]
 pub(super) struct Timeline {
     tick_s: f64,
-    /// The list under way and the next one, by turns: what is handed over is copied item by item, and never moved.
+    /// The list under way and the next one, by turns: a list is kilobytes, and is never moved.
     lists: [Handed; 2],
     is_second_under_way: bool,
     next: Option<Next>,
@@ -111,7 +111,7 @@ impl Timeline {
         }
     }
 
-    /// As new. The leads stay as far as they have grown.
+    /// Begins anew. The leads stay as far as they have grown.
     pub(super) fn restart(&mut self) {
         let Handed { id, list, before } = self.under_way_mut();
         list.restart(Self::BEGIN);
@@ -138,13 +138,14 @@ impl Timeline {
         if self.is_second_under_way { second } else { first }
     }
 
-    /// The other one, which is the next list's, if there is one.
-    fn other(&self) -> &Handed {
+    /// The next list, if there is one.
+    fn next_handed(&self) -> Option<&Handed> {
         let [first, second] = &self.lists;
-        if self.is_second_under_way { first } else { second }
+        self.next.map(|_| if self.is_second_under_way { first } else { second })
     }
 
-    fn other_mut(&mut self) -> &mut Handed {
+    /// The place for the next list.
+    fn place_of_next(&mut self) -> &mut Handed {
         let [first, second] = &mut self.lists;
         if self.is_second_under_way { first } else { second }
     }
@@ -157,8 +158,7 @@ impl Timeline {
     /// The lists that the tick has and will have.
     #[cfg(feature = "scope")]
     pub(super) fn handed(&self) -> impl Iterator<Item = (u8, &List)> {
-        let next = self.next.map(|_| self.other());
-        core::iter::once(self.under_way()).chain(next).map(|handed| (handed.id, &handed.list))
+        core::iter::once(self.under_way()).chain(self.next_handed()).map(|handed| (handed.id, &handed.list))
     }
 
     /// Where the next list begins.
@@ -231,7 +231,7 @@ impl Timeline {
         feeder: &mut LiveFeeder<'_, R, AXES>,
     ) -> Progress {
         let progress = feeder.progress();
-        if self.next.is_some() && self.other().id == progress.list {
+        if self.next_handed().is_some_and(|next| next.id == progress.list) {
             feeder.give_up(self.under_way().id);
             (self.is_second_under_way, self.next) = (!self.is_second_under_way, None);
             feed.follow();
@@ -247,8 +247,9 @@ impl Timeline {
     ) -> Progress {
         feeder.no_change();
         let progress = self.follow(feed, feeder);
-        if let Some(Next { before_override, .. }) = self.next.take() {
-            feeder.give_up(self.other().id);
+        let id = self.next_handed().map(|next| next.id);
+        if let (Some(Next { before_override, .. }), Some(id)) = (self.next.take(), id) {
+            feeder.give_up(id);
             self.driven_override = before_override;
             self.splice = self.list().exit_splice();
             feed.roll_back();
@@ -339,9 +340,9 @@ impl Timeline {
         self.splice = list.exit_splice();
         let before_override = core::mem::replace(&mut self.driven_override, feed_override);
         self.next = Some(Next { request: None, before_override });
-        let next = self.other_mut();
+        let next = self.place_of_next();
         (next.id, next.before) = (id, before);
-        next.list.copy(list);
+        next.list.assign(list);
         handed_over
     }
 

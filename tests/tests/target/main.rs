@@ -35,7 +35,7 @@ use tools::Tools;
 type Test = fn(&Tools) -> Result<(), String>;
 
 /// Name, whether it holds figures that depend on the compiler, and the test. The longest first: others run beside it.
-const TESTS: [(&str, bool, Test); 19] = [
+const TESTS: [(&str, bool, Test); 20] = [
     ("a_sender_is_killed", false, killed::a_sender_is_killed),
     ("estimated_cycles", true, cycles::estimated_cycles),
     ("the_firmware_runs", false, firmware::the_firmware_runs),
@@ -56,6 +56,7 @@ const TESTS: [(&str, bool, Test); 19] = [
     ("instructions_of_a_tick", true, budget::instructions_of_a_tick),
     ("the_longest_ticks_and_turns", true, search::the_longest_ticks_and_turns),
     ("instructions_of_functions", true, functions::instructions_of_functions),
+    ("the_runtime_is_linked", false, runtime::the_runtime_is_linked),
     ("the_same_sums_and_products", false, runtime::the_same_sums_and_products),
     ("instructions_of_the_runtime", true, runtime::instructions_of_the_runtime),
     ("sizes", true, image::sizes),

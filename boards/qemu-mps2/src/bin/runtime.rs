@@ -1,6 +1,6 @@
-//! What the compiler calls where a core has no instruction: sums, differences, products, quotients and comparisons of f64, and
-//! copies. Prints a digest of all results so far after every ten thousand pairs, and the instructions of those of two
-//! normal numbers that make one; looks at every byte of copies, and around them.
+//! What the compiler calls where a core has no instruction: arithmetic of f64, and copies. Prints a digest of all results so
+//! far after every ten thousand pairs, and the instructions where both numbers and the result are normal. Checks every byte of
+//! copies and around them.
 #![no_std]
 #![no_main]
 
@@ -30,7 +30,7 @@ fn main() -> ! {
     let mut results = Results::default();
     for (number, (a, b)) in (1..).zip(Operands::new(2).take(PAIRS)) {
         let (x, y) = black_box((f64::from_bits(a), f64::from_bits(b)));
-        results.take(x + y, x - y, x * y, x / y, [x < y, x <= y, x > y, x >= y]);
+        results.take(x, y);
         if number % 10_000 == 0 {
             println!("digest {:016x}", results.digest());
         }
@@ -56,7 +56,7 @@ fn copies(counter: &Counter) {
         fn __aeabi_memcpy4(to: *mut u8, from: *const u8, bytes: usize);
         fn __aeabi_memcpy8(to: *mut u8, from: *const u8, bytes: usize);
     }
-    /// Of the last byte that is written before, and of the first one behind.
+    /// The bytes around a copy.
     const UNTOUCHED: u8 = 0xA5;
     #[repr(align(8))]
     struct Aligned<const BYTES: usize>([u8; BYTES]);
@@ -68,7 +68,7 @@ fn copies(counter: &Counter) {
     for (copy, name, align) in
         [(__aeabi_memcpy4 as unsafe extern "C" fn(_, _, _), "copy4", 4), (__aeabi_memcpy8, "copy8", 8)]
     {
-        for (from, to) in [(0, 8), (align & 4, 8), (align & 4, 8 + (align & 4)), (0, 8 + (align & 4))] {
+        for (from, to) in [(0, 8), (0, 8 + align), (align, 8), (align, 8 + align)] {
             for bytes in 0..=MOST {
                 let mut target = Aligned([UNTOUCHED; MOST + 24]);
                 let (begin, source) = (target.0[to..].as_mut_ptr(), source.0[from..].as_ptr());

@@ -445,7 +445,7 @@ impl<'a> Intervals<'a> {
         } else {
             peak(&law, feed, other.feed_mm_s, beyond.length_mm).min(mean_mm_s)
         };
-        // Each of these takes a while.
+        // The times below take a while.
         if !(peak > feed) || self.attention.is_wanted() {
             return 0.0;
         }

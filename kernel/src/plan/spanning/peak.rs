@@ -94,7 +94,8 @@ impl<'a> Sides<'a> {
         Some(self.room_mm() - up_mm - down_mm)
     }
 
-    /// Plans both sides up to the peak with the least time, and returns that peak.
+    /// Plans both sides up to the peak with the least time, and returns that peak. `None` if there is none, or something more urgent
+    /// waits.
     pub(super) fn best(&self, up: &mut Ascent<'_>, down: &mut Ascent<'_>) -> Option<f64> {
         if self.intervals.attention.is_wanted() {
             return None;
