@@ -53,7 +53,11 @@ impl Iterator for Operands {
             3 => (a, with(b, exponent.wrapping_add(self.small(2)))),
             4 => (a, a ^ b & SIGN ^ b >> 1 >> (kind >> 8 & 63) & FRACTION),
             5 | 6 => (short(a, kind >> 8), with(short(b, kind >> 16), near)),
-            7 => (short(a, kind >> 8), with(b, near)),
+            // A sum that carries far up, of a number with one bit more, which may be lost.
+            7 => (
+                a | FRACTION << (kind >> 8 & 63) & FRACTION,
+                with(b & !FRACTION | 1 << (kind >> 16) % 52, near),
+            ),
             // Sums of small numbers and of great ones.
             8 => (with(a, kind >> 8 & 63), with(b, kind >> 16 & 63)),
             9 => (with(a, 2046 - (kind >> 8 & 3)), with(b, 2046 - (kind >> 16 & 63))),

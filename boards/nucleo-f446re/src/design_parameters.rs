@@ -134,15 +134,15 @@ pub const ITEMS_PER_S: u32 = (SYSCLK_HZ - TICK_HZ * TICK_CYCLES_TAKEN) / ITEM_CY
 pub const PLACES: usize = 64;
 /// Greatest number of instructions counted for a poll of the background on an emulated Cortex-M4F, under
 /// random commands, rounded up.
-pub const POLL_INSTRUCTIONS_MAX: u32 = 6_500_000;
+pub const POLL_INSTRUCTIONS_MAX: u32 = 4_000_000;
 /// The longest poll of the background \[cycles\], at two per instruction: assumed, not measured, like the
 /// items' above.
 pub const POLL_CYCLES_MAX: u32 = 2 * POLL_INSTRUCTIONS_MAX;
-/// The same in ticks, which take their share of the processor: some 82 ms.
+/// The same in ticks, which take their share of the processor: some 50 ms.
 pub const POLL_TICKS_MAX: u32 = ticks_of(POLL_CYCLES_MAX);
 /// Greatest number of instructions counted for a step of a poll, rounded up: between two looks for a stop, each of which
 /// tells the tick that the background is alive.
-pub const STEP_INSTRUCTIONS_MAX: u32 = 200_000;
+pub const STEP_INSTRUCTIONS_MAX: u32 = 100_000;
 /// The longest step \[ticks\], estimated in the same way.
 pub const STEP_TICKS_MAX: u32 = ticks_of(2 * STEP_INSTRUCTIONS_MAX);
 
@@ -326,8 +326,8 @@ mod tests {
         assert_eq!(ITEMS_PER_S, 8000);
         let readme = include_str!("../README.md");
         assert!(readme.contains("8000 items a second"));
-        assert_eq!((POLL_TICKS_MAX * 1000).div_ceil(TICK_HZ), 82);
-        assert!(readme.contains("up to 82 ms"));
+        assert_eq!((POLL_TICKS_MAX * 1000).div_ceil(TICK_HZ), 50);
+        assert!(readme.contains("up to 50 ms"));
     }
 
     #[test]

@@ -1,8 +1,6 @@
 //! What the compiler calls where a core has no instruction: arithmetic of f64 with the same bits as on a PC, and the instructions
 //! of it and of copies.
 
-use std::path::PathBuf;
-
 use armv7m_runtime::operands::{Operands, PAIRS, Results};
 use motion_tests::figures::{Table, hold};
 use object::{Object, ObjectSymbol};
@@ -46,10 +44,11 @@ pub(crate) fn the_same_sums_and_products(tools: &Tools) -> Result<(), String> {
 
 /// Results and tests are the same without it.
 pub(crate) fn the_runtime_is_linked(tools: &Tools) -> Result<(), String> {
-    let kernels = LIVE_BOARDS.into_iter().map(|board| Ok((board.core, tools.image(board, "kernel_only")?)));
-    let firmware = std::iter::once_with(|| Ok(("the firmware", tools.firmware("emulated")?)));
-    for image in kernels.chain(firmware) {
-        let (name, path): (_, PathBuf) = image?;
+    let mut images = vec![("the firmware", tools.firmware("emulated")?)];
+    for board in LIVE_BOARDS {
+        images.push((board.core, tools.image(board, "kernel_only")?));
+    }
+    for (name, path) in images {
         let bytes = std::fs::read(&path).map_err(|error| format!("{}: {error}", path.display()))?;
         let object = object::File::parse(&*bytes).map_err(|error| error.to_string())?;
         let is_there =
