@@ -56,7 +56,7 @@ impl Iterator for Operands {
             // A sum that carries far up, of a number with one bit more, which may be lost.
             7 => (
                 a | FRACTION << (kind >> 8 & 63) & FRACTION,
-                with(b & !FRACTION | 1 << (kind >> 16) % 52, near),
+                with(b & !FRACTION | 1 << ((kind >> 16) % 52), near),
             ),
             // Sums of small numbers and of great ones.
             8 => (with(a, kind >> 8 & 63), with(b, kind >> 16 & 63)),
