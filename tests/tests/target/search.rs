@@ -53,7 +53,7 @@ pub(crate) const KINDS: [Kind; 5] = [
 ];
 
 /// Instructions of a turn of live control's background that are promised, on an M4F: what was found and 5 %.
-pub(crate) const TURN: u32 = 4_400_000;
+pub(crate) const TURN: u32 = 2_480_000;
 
 /// Seeds that are searched when nothing else is asked for, so that the search works when it is.
 const FEW: u32 = 3;
