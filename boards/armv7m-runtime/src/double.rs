@@ -8,6 +8,52 @@ use core::arch::naked_asm;
 
 use crate::any;
 
+/// The exponents of a and b to r4 and r5; to 90 if a number is not normal.
+macro_rules! normal_operands {
+    () => {
+        concat!(
+            "movw r12, #0x7ff\n",
+            "ands r4, r12, r1, lsr #20\n",
+            "ittt ne\n",
+            "andsne.w r5, r12, r3, lsr #20\n",
+            "teqne r4, r12\n",
+            "teqne r5, r12\n",
+            "beq 90f\n"
+        )
+    };
+}
+
+/// b's digits, r5 < 32 places below a's, to a's places in r3 and r2, and to r6 what lies below them.
+macro_rules! align {
+    () => {
+        concat!(
+            "bfc r3, #20, #12\n",
+            "orr r3, r3, #0x100000\n",
+            "rsb lr, r5, #32\n",
+            "lsl r6, r2, lr\n",
+            "lsr r2, r2, r5\n",
+            "lsl r12, r3, lr\n",
+            "orr r2, r2, r12\n",
+            "lsr r3, r3, r5\n"
+        )
+    };
+}
+
+/// To 9 if a number is infinite or NaN.
+macro_rules! unless_exponent_is_greatest {
+    () => {
+        concat!(
+            "lsl r12, r1, #1\n",
+            "mvns r12, r12, asr #21\n",
+            "it ne\n",
+            "lslne r12, r3, #1\n",
+            "it ne\n",
+            "mvnsne.w r12, r12, asr #21\n",
+            "beq 9f\n"
+        )
+    };
+}
+
 /// a − b.
 #[unsafe(no_mangle)]
 #[unsafe(naked)]
@@ -48,15 +94,7 @@ extern "C" fn __aeabi_dadd(a: u64, b: u64) -> u64 {
         "bhs 50f",
         "teq r1, r3",
         "bmi 40f",
-        // The smaller one in the places of the greater one, and in r6 what lies below them.
-        "bfc r3, #20, #12",
-        "orr r3, r3, #0x100000",
-        "rsb lr, r5, #32",
-        "lsl r6, r2, lr",
-        "lsr r2, r2, r5",
-        "lsl r12, r3, lr",
-        "orr r2, r2, r12",
-        "lsr r3, r3, r5",
+        align!(),
         "30:",
         "adds r0, r0, r2",
         "adc r2, r1, r3",
@@ -98,14 +136,7 @@ extern "C" fn __aeabi_dadd(a: u64, b: u64) -> u64 {
         "40:",
         "cmp r5, #0",
         "beq 60f",
-        "bfc r3, #20, #12",
-        "orr r3, r3, #0x100000",
-        "rsb lr, r5, #32",
-        "lsl r6, r2, lr",
-        "lsr r2, r2, r5",
-        "lsl r12, r3, lr",
-        "orr r2, r2, r12",
-        "lsr r3, r3, r5",
+        align!(),
         "41:",
         "rsbs r6, r6, #0",
         "sbcs r0, r0, r2",
@@ -202,14 +233,8 @@ extern "C" fn __aeabi_dadd(a: u64, b: u64) -> u64 {
 extern "C" fn __aeabi_dmul(a: u64, b: u64) -> u64 {
     naked_asm!(
         "push {{r4, r5, r6, r7, r8, lr}}",
-        // Two normal numbers, and their product, too.
-        "movw r12, #0x7ff",
-        "ands r4, r12, r1, lsr #20",
-        "ittt ne",
-        "andsne.w r5, r12, r3, lsr #20",
-        "teqne r4, r12",
-        "teqne r5, r12",
-        "beq 90f",
+        // The product is to be normal, too.
+        normal_operands!(),
         "add r4, r4, r5",
         "subw r4, r4, #1023",
         "cmp r4, #0x7f0",
@@ -283,14 +308,8 @@ extern "C" fn __aeabi_dmul(a: u64, b: u64) -> u64 {
 extern "C" fn __aeabi_ddiv(a: u64, b: u64) -> u64 {
     naked_asm!(
         "push {{r4, r5, r6, r7, r8, lr}}",
-        // Two normal numbers, and their quotient, too.
-        "movw r12, #0x7ff",
-        "ands r4, r12, r1, lsr #20",
-        "ittt ne",
-        "andsne.w r5, r12, r3, lsr #20",
-        "teqne r4, r12",
-        "teqne r5, r12",
-        "beq 90f",
+        // The quotient is to be normal, too.
+        normal_operands!(),
         "sub r4, r4, r5",
         "addw r4, r4, #1021",
         "cmp r4, #0x7f0",
@@ -394,15 +413,8 @@ macro_rules! comparison {
                 concat!("movlo r0, #", $if_so),
                 concat!("movhs r0, #", $if_not),
                 "bx lr",
-                // Infinite or NaN.
                 "3:",
-                "lsl r12, r1, #1",
-                "mvns r12, r12, asr #21",
-                "it ne",
-                "lslne r12, r3, #1",
-                "it ne",
-                "mvnsne.w r12, r12, asr #21",
-                "beq 9f",
+                unless_exponent_is_greatest!(),
                 "teq r1, r3",
                 "bmi 4f",
                 "cmp r1, #0",
@@ -487,13 +499,7 @@ extern "C" fn __aeabi_dcmpeq(a: u64, b: u64) -> u32 {
 #[unsafe(naked)]
 extern "C" fn __aeabi_dcmpun(a: u64, b: u64) -> u32 {
     naked_asm!(
-        "lsl r12, r1, #1",
-        "mvns r12, r12, asr #21",
-        "it ne",
-        "lslne r12, r3, #1",
-        "it ne",
-        "mvnsne.w r12, r12, asr #21",
-        "beq 9f",
+        unless_exponent_is_greatest!(),
         "mov r0, #0",
         "bx lr",
         "9:",

@@ -1,6 +1,8 @@
 //! Pairs of numbers to test the routines with: with exponents far apart and near; with short fractions, so that sums and products
 //! are half way between two numbers; at both ends of the range; and zeros, infinities and NaN.
 
+use core::hint::black_box;
+
 const FRACTION: u64 = (1 << 52) - 1;
 const SIGN: u64 = 1 << 63;
 /// Numbers with rules of their own, as bits without sign: zero, the least number, the greatest subnormal number, the least normal
@@ -8,8 +10,21 @@ const SIGN: u64 = 1 << 63;
 const SPECIAL: [u64; 8] =
     [0, 1, FRACTION, FRACTION + 1, 1023 << 52, (0x7FF << 52) - 1, 0x7FF << 52, (0x7FF << 52) + 1];
 
-/// Pairs that emulated cores try.
-pub const PAIRS: usize = 2_000_000;
+/// Pairs that emulated cores are tested with, and after how many each time there is a digest.
+const PAIRS: usize = 2_000_000;
+const PAIRS_PER_DIGEST: usize = 10_000;
+
+/// Digests of the results of all pairs so far, as the processor computes them, after every ten thousand of two million.
+pub fn digests() -> impl Iterator<Item = u64> {
+    let (mut pairs, mut results) = (Operands::new(2), Results::default());
+    (0..PAIRS / PAIRS_PER_DIGEST).map(move |_| {
+        for (a, b) in pairs.by_ref().take(PAIRS_PER_DIGEST) {
+            let (x, y) = black_box((f64::from_bits(a), f64::from_bits(b)));
+            results.take(x, y);
+        }
+        results.0
+    })
+}
 
 /// A sequence of pairs, as bits of f64; the same for a seed everywhere.
 #[derive(Clone, Copy, Debug)]
@@ -74,12 +89,12 @@ impl Iterator for Operands {
 }
 
 /// A digest of results, in which every NaN is the same.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Results(u64);
+#[derive(Default)]
+struct Results(u64);
 
 impl Results {
     /// Adds those of a pair.
-    pub fn take(&mut self, x: f64, y: f64) {
+    fn take(&mut self, x: f64, y: f64) {
         for result in [x + y, x - y, x * y, x / y] {
             // By its bits: comparisons are tested themselves.
             let bits = result.to_bits();
@@ -92,11 +107,5 @@ impl Results {
     fn add(&mut self, bits: u64) {
         // FNV-1a, by words.
         self.0 = (self.0 ^ bits).wrapping_mul(0x0000_0100_0000_01B3).rotate_left(29);
-    }
-
-    /// The digest of all so far.
-    #[must_use]
-    pub fn digest(&self) -> u64 {
-        self.0
     }
 }

@@ -1,33 +1,19 @@
 //! What the compiler calls where a core has no instruction: arithmetic of f64 with the same bits as on a PC, and the instructions
 //! of it and of copies.
 
-use armv7m_runtime::operands::{Operands, PAIRS, Results};
+use armv7m_runtime::operands::digests;
 use motion_tests::figures::{Table, hold};
 use object::{Object, ObjectSymbol};
 
 use crate::budget::{GROWTH, by_name};
 use crate::tools::{BOARDS, Board, Clock, LIVE_BOARDS, M7, RISC_V, Tools};
 
-/// Every ten thousandth digest.
-fn on_the_pc() -> Vec<String> {
-    let mut results = Results::default();
-    let pairs = Operands::new(2).take(PAIRS).map(|(a, b)| (f64::from_bits(a), f64::from_bits(b)));
-    let mut digests = Vec::new();
-    for (number, (x, y)) in (1..).zip(pairs) {
-        results.take(x, y);
-        if number % 10_000 == 0 {
-            digests.push(format!("{:016x}", results.digest()));
-        }
-    }
-    digests
-}
-
 fn printed(tools: &Tools, board: Board) -> Result<String, String> {
     tools.run(board, "runtime", &[], Clock::Counting)
 }
 
 pub(crate) fn the_same_sums_and_products(tools: &Tools) -> Result<(), String> {
-    let expected = on_the_pc();
+    let expected: Vec<_> = digests().map(|digest| format!("{digest:016x}")).collect();
     for board in BOARDS {
         let printed = printed(tools, board)?;
         let found: Vec<_> = printed.lines().filter_map(|line| line.strip_prefix("digest ")).collect();
