@@ -59,12 +59,6 @@ impl CutRamp {
         }
     }
 
-    /// The greatest acceleration, in the middle, with the sign of the change of feed \[mm/s²\].
-    #[must_use]
-    pub fn peak_accel_mm_s2(&self) -> f64 {
-        self.cut().peak_accel_mm_s2
-    }
-
     /// The feed at its end \[mm/s\].
     #[must_use]
     pub fn to_mm_s(&self) -> f64 {
