@@ -398,6 +398,25 @@ mod tests {
     use crate::law::{Law, LimitedBy};
     use crate::random::Random;
 
+    /// In every field, whatever it was before.
+    #[test]
+    fn what_is_assigned_is_the_same_list() {
+        let at =
+            |mm, feed_mm_s| Splice { stretch: 1, at: Position::from_mm(mm).expect("in range"), feed_mm_s };
+        let mut other = List::new(at(2.0, 10.0), 5e-4);
+        other.push_cruise(10.0, Position::from_mm(3.0).expect("in range"));
+        other.set_exit_to_end();
+        other.push(Item::Stop);
+        other.set_ends_block(true);
+        let mut list = List::new(at(1.0, 5.0), 1e-3);
+        for items in 0..3 {
+            list.assign(&other);
+            assert_eq!(std::format!("{list:?}"), std::format!("{other:?}"), "over {items} items");
+            list.restart(at(9.0, 1.0));
+            (0..=items).for_each(|_| list.push_cruise(1.0, Position::from_mm(0.5).expect("in range")));
+        }
+    }
+
     /// Wherever a ramp is to end, it can be cut so that it does, whole or cut already, and never beyond.
     #[test]
     fn a_ramp_is_given_up_where_it_gets_to_a_feed() {
